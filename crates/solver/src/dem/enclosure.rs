@@ -66,18 +66,23 @@ impl Enclosure {
     pub(super) fn faces(&self) -> impl Iterator<Item = WallFace> + '_ {
         (0..6).filter_map(|k| self.face(k / 2, k % 2))
     }
-    /// Number of periods by which `x` lies outside the box, zero along axes that are not periodic.
+    /// Number of periods in each component of `distance` [m], rounded by `round`; zero along axes
+    /// that are not periodic.
     ///
     /// The count is clamped to a million, so that a diverging grain cannot overflow it.
-    pub(super) fn periods_outside(&self, x: DVec3) -> IVec3 {
+    pub(super) fn periods(&self, distance: DVec3, round: impl Fn(f64) -> f64) -> IVec3 {
         let period = self.period();
         IVec3::from_array([0, 1, 2].map(|axis| {
             if period[axis] > 0.0 {
-                ((x[axis] - self.lower[axis]) / period[axis]).floor().clamp(-1e6, 1e6) as i32
+                round(distance[axis] / period[axis]).clamp(-1e6, 1e6) as i32
             } else {
                 0
             }
         }))
+    }
+    /// Number of periods by which `x` lies outside the box.
+    pub(super) fn periods_outside(&self, x: DVec3) -> IVec3 {
+        self.periods(x - self.lower, f64::floor)
     }
     /// Image of `x` inside the box along periodic axes [m].
     pub fn wrap(&self, x: DVec3) -> DVec3 {
@@ -85,11 +90,7 @@ impl Enclosure {
     }
     /// Shortest periodic image of a separation vector [m].
     pub fn nearest_image(&self, separation: DVec3) -> DVec3 {
-        let period = self.period();
-        DVec3::from_array([0, 1, 2].map(|axis| {
-            let (d, l) = (separation[axis], period[axis]);
-            if l > 0.0 { d - l * (d / l).round() } else { d }
-        }))
+        separation - self.periods(separation, f64::round).as_dvec3() * self.period()
     }
 }
 
@@ -114,35 +115,20 @@ impl From<&WallFace> for Partner {
 }
 
 /// Key of a pair, ordered by grain, then partner (grains before walls), then image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PairKey {
     /// First grain.
     pub grain: u32,
     /// Second body.
     pub partner: Partner,
     /// Periods from the partner's own position to the image in question.
-    pub image: IVec3,
+    pub image: [i32; 3],
 }
 
 impl PairKey {
     /// Pair of a grain with a wall.
     pub(super) fn wall(grain: u32, face: &WallFace) -> PairKey {
-        PairKey { grain, partner: face.into(), image: IVec3::ZERO }
-    }
-
-    fn rank(&self) -> (u32, Partner, [i32; 3]) {
-        (self.grain, self.partner, self.image.to_array())
-    }
-}
-
-impl Ord for PairKey {
-    fn cmp(&self, other: &PairKey) -> std::cmp::Ordering {
-        self.rank().cmp(&other.rank())
-    }
-}
-impl PartialOrd for PairKey {
-    fn partial_cmp(&self, other: &PairKey) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
+        PairKey { grain, partner: face.into(), image: [0; 3] }
     }
 }
 
@@ -178,7 +164,7 @@ mod tests {
 
     #[test]
     fn walls_come_after_grains() {
-        let key = |grain: u32, partner| PairKey { grain, partner, image: IVec3::ZERO };
+        let key = |grain: u32, partner| PairKey { grain, partner, image: [0; 3] };
         let wall = key(0, Partner::Wall { axis: 0, side: 0 });
         assert!(key(0, Partner::Grain(999)) < wall && wall < key(1, Partner::Grain(0)));
     }

@@ -1,118 +1,18 @@
-//! Contact force laws: parameters, properties of a pair, the interface of the laws, the linear law
-//! of the paper (Eqs 9 and 14) and Hertz-Mindlin.
+//! Contact force laws: properties of a pair, the interface of the laws, the linear law of the paper
+//! (Eqs 9 and 14) and Hertz-Mindlin.
 
-use serde::{Deserialize, Serialize};
-
-use crate::dem::grain::{Grain, MIN_RESTITUTION, Material, damping_ratio};
-
-/// Force laws of a contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ContactLawKind {
-    /// Linear spring and dashpot (Eqs 9 and 14), the paper's law.
-    #[default]
-    Linear,
-    /// Hertz normal force and no-slip Mindlin tangential force.
-    HertzMindlin,
-}
-
-/// Contact law (Eqs 9-18) and its options.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactParams {
-    /// Force law. The linear law uses `normal_stiffness`, `tangential_ratio`, `restitution` and
-    /// `tangential_damping`; Hertz-Mindlin uses the materials of grains and walls.
-    pub law: ContactLawKind,
-    /// Normal stiffness k_n [N/m] (Eq. 9).
-    pub normal_stiffness: f64,
-    /// Tangential stiffness over normal stiffness, k_zeta / k_n (Eq. 14).
-    pub tangential_ratio: f64,
-    /// Coulomb friction coefficient between grains (Eq. 15).
-    pub friction: f64,
-    /// Coulomb friction coefficient at walls.
-    pub wall_friction: f64,
-    /// Coefficient of restitution; 1 has no dashpot (the paper's setting). Values below
-    /// `MIN_RESTITUTION` act as that value, at which a contact hardly rebounds.
-    pub restitution: f64,
-    /// Tangential over normal dashpot, for `restitution` < 1.
-    pub tangential_damping: f64,
-    /// Material of the walls.
-    pub wall_material: Material,
-    /// Global damping constant xi [1/s] (Eqs 6, 22, 24).
-    pub global_damping: f64,
-    /// Gap below which the lubrication force acts [m]; zero switches it off (the paper's setting).
-    pub lubrication_gap: f64,
-    /// Dynamic viscosity of the fluid in the lubrication force [Pa s].
-    pub lubrication_viscosity: f64,
-    /// Height of the asperities [m], the smallest thickness of the lubrication film.
-    pub roughness: f64,
-    /// Added mass of a touching grain over its volume [kg/m^3]. A contact shorter than a step also
-    /// accelerates this fluid; without it the fluid takes the momentum afterwards (decision 0009).
-    pub added_density: f64,
-    /// Sub-steps per contact time of the fastest pair.
-    pub substeps_per_contact: f64,
-    /// Overlap over the smaller equivalent diameter above which a step of
-    /// [`Simulation`](crate::sim::Simulation) fails; by default infinite, which is no limit.
-    pub overlap_limit: f64,
-}
-
-impl Default for ContactParams {
-    fn default() -> Self {
-        ContactParams {
-            law: ContactLawKind::Linear,
-            normal_stiffness: 100.0,
-            tangential_ratio: 2.0 / 7.0,
-            friction: 0.5,
-            wall_friction: 0.5,
-            restitution: 1.0,
-            tangential_damping: 0.5,
-            wall_material: Material::RIGID,
-            global_damping: 0.0,
-            lubrication_gap: 0.0,
-            lubrication_viscosity: 0.0,
-            roughness: 0.0,
-            added_density: 0.0,
-            substeps_per_contact: 25.0,
-            overlap_limit: f64::INFINITY,
-        }
-    }
-}
-
-impl ContactParams {
-    /// Restitution below which the dashpot grows no further.
-    pub const MIN_RESTITUTION: f64 = MIN_RESTITUTION;
-
-    /// Damping ratio of the linear law, c / (2 sqrt(k m)), that gives `restitution`.
-    pub fn damping_ratio(&self) -> f64 {
-        damping_ratio(self.restitution)
-    }
-
-    /// Stiffness [N/m] at which two bodies of reduced mass `mass` [kg] that meet at `speed` [m/s]
-    /// overlap by at most `overlap` [m].
-    pub fn stiffness_for_overlap(mass: f64, speed: f64, overlap: f64) -> f64 {
-        mass * (speed / overlap).powi(2)
-    }
-}
+use std::f64::consts::PI;
+use std::fmt::Debug;
 
 /// Elastic constants of one body as contact laws use them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::dem) struct ContactMaterial {
     /// (1 - nu^2) / E [1/Pa].
-    normal_compliance: f64,
+    pub normal_compliance: f64,
     /// (2 - nu) / G [1/Pa].
-    tangential_compliance: f64,
+    pub tangential_compliance: f64,
     /// Damping ratio of the restitution.
-    damping_ratio: f64,
-}
-
-impl ContactMaterial {
-    /// Constants of a material.
-    pub fn new(material: &Material) -> ContactMaterial {
-        ContactMaterial {
-            normal_compliance: material.normal_compliance(),
-            tangential_compliance: material.tangential_compliance(),
-            damping_ratio: damping_ratio(material.restitution),
-        }
-    }
+    pub damping_ratio: f64,
 }
 
 /// Properties of a pair that do not change during a contact.
@@ -144,35 +44,23 @@ pub(in crate::dem) struct BodyProperties {
 }
 
 impl PairProperties {
-    /// Properties of two grains.
-    pub fn of_grains(a: &BodyProperties, b: &BodyProperties) -> PairProperties {
+    /// Properties of a grain and its partner. A partner of `None` is a wall of the material `wall`,
+    /// whose mass and radius are infinite.
+    pub fn new(
+        grain: &BodyProperties,
+        partner: Option<&BodyProperties>,
+        wall: &ContactMaterial,
+    ) -> PairProperties {
+        let (a, b) = (&grain.material, partner.map_or(wall, |partner| &partner.material));
         PairProperties {
-            inverse_mass: a.inverse_mass + b.inverse_mass,
-            reduced_radius: a.radius * b.radius / (a.radius + b.radius),
-            partner_is_wall: false,
-            ..PairProperties::of_materials(&a.material, &b.material)
-        }
-    }
-
-    /// Properties of a grain and a plane wall, whose mass and radius are infinite.
-    pub fn with_wall(grain: &BodyProperties, wall: &ContactMaterial) -> PairProperties {
-        PairProperties {
-            inverse_mass: grain.inverse_mass,
-            reduced_radius: grain.radius,
-            partner_is_wall: true,
-            ..PairProperties::of_materials(&grain.material, wall)
-        }
-    }
-
-    /// Elastic constants of a pair; mass and radius are zero.
-    fn of_materials(a: &ContactMaterial, b: &ContactMaterial) -> PairProperties {
-        PairProperties {
-            inverse_mass: 0.0,
-            reduced_radius: 0.0,
+            inverse_mass: grain.inverse_mass + partner.map_or(0.0, |partner| partner.inverse_mass),
+            reduced_radius: partner.map_or(grain.radius, |partner| {
+                grain.radius * partner.radius / (grain.radius + partner.radius)
+            }),
             effective_youngs_modulus: 1.0 / (a.normal_compliance + b.normal_compliance),
             effective_shear_modulus: 1.0 / (a.tangential_compliance + b.tangential_compliance),
             damping_ratio: a.damping_ratio.max(b.damping_ratio),
-            partner_is_wall: false,
+            partner_is_wall: partner.is_none(),
         }
     }
 }
@@ -196,7 +84,7 @@ pub(in crate::dem) struct ContactCoefficients {
 ///
 /// A law sees the deepest overlap of the pair. The pair's force is distributed over the penetrating
 /// points by `ContactModel`, which also applies Coulomb's bound.
-pub(in crate::dem) trait ContactLaw {
+pub(in crate::dem) trait ContactLaw: Debug + Send + Sync {
     /// Forces and coefficients at `overlap` [m], positive.
     fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients;
 
@@ -217,25 +105,13 @@ pub(in crate::dem) trait ContactLaw {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Linear {
     /// k_n [N/m].
-    normal_stiffness: f64,
+    pub normal_stiffness: f64,
     /// k_zeta [N/m].
-    tangential_stiffness: f64,
+    pub tangential_stiffness: f64,
     /// Damping ratio of the restitution.
-    damping_ratio: f64,
+    pub damping_ratio: f64,
     /// Tangential over normal dashpot.
-    tangential_damping_ratio: f64,
-}
-
-impl Linear {
-    /// Law of these parameters.
-    pub fn new(params: &ContactParams) -> Linear {
-        Linear {
-            normal_stiffness: params.normal_stiffness,
-            tangential_stiffness: params.normal_stiffness * params.tangential_ratio,
-            damping_ratio: damping_ratio(params.restitution),
-            tangential_damping_ratio: params.tangential_damping,
-        }
-    }
+    pub tangential_damping_ratio: f64,
 }
 
 impl ContactLaw for Linear {
@@ -257,7 +133,7 @@ impl ContactLaw for Linear {
 
     /// Half period of the spring, pi sqrt(m / k_n).
     fn contact_time(&self, pair: &PairProperties, _speed: f64, _overlap: f64) -> f64 {
-        std::f64::consts::PI * (1.0 / pair.inverse_mass / self.normal_stiffness).sqrt()
+        PI * (1.0 / pair.inverse_mass / self.normal_stiffness).sqrt()
     }
 
     fn impact_overlap(&self, pair: &PairProperties, speed: f64) -> f64 {
@@ -272,7 +148,7 @@ impl ContactLaw for Linear {
 /// T                = 2.9432 overlap / speed
 /// pi sqrt(m / S_n) = pi sqrt(8/15) overlap / speed
 /// ```
-const HERTZ_DURATION: f64 = 2.943_275 / (std::f64::consts::PI * 0.730_296_743_340_221_5);
+const HERTZ_DURATION: f64 = 2.943_275 / (PI * 0.730_296_743_340_221_5);
 
 /// Hertz normal law and no-slip Mindlin tangential law. Moduli, radius and restitution come from
 /// the pair.
@@ -326,8 +202,7 @@ impl ContactLaw for HertzMindlin {
         let largest = (self.impact_overlap(pair, speed).powf(2.5) + overlap.powf(2.5)).powf(0.4);
         let contact_radius = (pair.reduced_radius * largest).sqrt();
         let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
-        let half_period =
-            std::f64::consts::PI * (1.0 / (pair.inverse_mass * normal_stiffness)).sqrt();
+        let half_period = PI * (1.0 / (pair.inverse_mass * normal_stiffness)).sqrt();
         HERTZ_DURATION * half_period
     }
 
@@ -337,69 +212,9 @@ impl ContactLaw for HertzMindlin {
     }
 }
 
-/// Law selected by the parameters.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) enum SelectedLaw {
-    /// Linear spring and dashpot.
-    Linear(Linear),
-    /// Hertz-Mindlin.
-    HertzMindlin(HertzMindlin),
-}
-
-impl SelectedLaw {
-    /// Law of these parameters.
-    pub fn new(params: &ContactParams) -> SelectedLaw {
-        match params.law {
-            ContactLawKind::Linear => SelectedLaw::Linear(Linear::new(params)),
-            ContactLawKind::HertzMindlin => SelectedLaw::HertzMindlin(HertzMindlin),
-        }
-    }
-    /// Selected law behind the interface of all laws.
-    pub fn get(&self) -> &dyn ContactLaw {
-        match self {
-            SelectedLaw::Linear(law) => law,
-            SelectedLaw::HertzMindlin(law) => law,
-        }
-    }
-}
-
-impl ContactParams {
-    /// Duration of an undamped impact at `speed` [m/s] between two grains equal to `grain` [s].
-    pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
-        let body = BodyProperties::of(grain);
-        let pair = PairProperties::of_grains(&body, &body);
-        SelectedLaw::new(self).get().contact_time(&pair, speed, 0.0)
-    }
-
-    /// Largest overlap of an undamped impact of `grain` on a wall at `speed` [m/s], without added
-    /// mass [m].
-    pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
-        let wall = ContactMaterial::new(&self.wall_material);
-        let pair = PairProperties::with_wall(&BodyProperties::of(grain), &wall);
-        SelectedLaw::new(self).get().impact_overlap(&pair, speed)
-    }
-}
-
-impl BodyProperties {
-    /// Properties of a grain without added mass, as if it moved freely.
-    pub fn of(grain: &Grain) -> BodyProperties {
-        BodyProperties {
-            inverse_mass: 1.0 / grain.mass(),
-            radius: 0.5 * grain.shape.equivalent_diameter(),
-            material: ContactMaterial::new(&grain.material),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn stiffness_for_overlap_inverts_the_energy_balance() {
-        let k = ContactParams::stiffness_for_overlap(2.0, 3.0, 1e-3);
-        assert!((0.5 * k * 1e-6 - 0.5 * 2.0 * 9.0).abs() < 1e-9);
-    }
 
     #[test]
     fn contact_time_is_the_duration_of_a_hertz_impact() {

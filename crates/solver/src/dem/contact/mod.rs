@@ -1,19 +1,22 @@
 //! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` has the
-//! force laws, `model.rs` the loads of a pair, `stiffening.rs` the stiffness that an impact needs.
+//! force laws, `model.rs` the loads of a pair. At set-up, `parameters.rs` selects the law, and
+//! `stiffening.rs` gives the stiffness that an impact needs.
 //!
 //! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
-//! variant of [`ContactLawKind`] and of `SelectedLaw`, and its keys in the case file. A cohesive
-//! law overrides `ContactLaw::normal_force`, which is never negative by default. A force across a
-//! gap belongs beside the lubrication in `model.rs`: `ContactModel::range` makes pairs of this gap
-//! contacts, and `substeps.rs` chooses the sub-steps and takes the mean over the nodes in contact.
+//! variant of [`ContactLawKind`], one arm of `ContactParams::force_law`, and its keys in the case
+//! file. A cohesive law overrides `ContactLaw::normal_force`, which is never negative by default. A
+//! force across a gap belongs beside the lubrication in `model.rs`: `ContactModel::range` makes
+//! pairs of this gap contacts, and `substeps.rs` chooses the sub-steps and takes the mean over the
+//! nodes in contact.
 
 mod law;
 mod model;
+mod parameters;
 mod stiffening;
 
 pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
-pub use law::{ContactLawKind, ContactParams};
 pub(super) use model::{ContactModel, PairKinematics};
+pub use parameters::{ContactLawKind, ContactParams};
 
 use glam::DVec3;
 
@@ -40,7 +43,7 @@ pub struct Contact {
 }
 
 /// Tangential displacement of a contact point, accumulated since the contact began (Eqs 13-15).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::dem) struct TangentialHistory {
     /// Identifier of the contact point; ascending within a pair.
     pub id: u32,
@@ -48,11 +51,6 @@ pub(in crate::dem) struct TangentialHistory {
     pub normal: DVec3,
     /// Displacement of the first grain relative to the partner, limited by Coulomb's bound [m].
     pub displacement: DVec3,
-}
-
-impl TangentialHistory {
-    const NONE: TangentialHistory =
-        TangentialHistory { id: 0, normal: DVec3::ZERO, displacement: DVec3::ZERO };
 }
 
 /// Overlap and loads of a pair.
@@ -106,14 +104,13 @@ impl Clone for ContactRecord {
         copy
     }
     /// Copies a record into the buffers of this one: the trial step copies all records in every
-    /// step.
+    /// step. What the search has found is not copied, since the next step starts without it.
     fn clone_from(&mut self, source: &ContactRecord) {
         let mut history = std::mem::take(&mut self.history);
-        let mut next_history = std::mem::take(&mut self.next_history);
-        let mut patch = std::mem::take(&mut self.patch);
         history.clone_from(&source.history);
-        next_history.clone_from(&source.next_history);
-        patch.clone_from(&source.patch);
+        let next_history = std::mem::take(&mut self.next_history);
+        let mut patch = std::mem::take(&mut self.patch);
+        patch.reset();
         *self = ContactRecord { history, next_history, patch, ..*source };
     }
 }
@@ -128,7 +125,7 @@ impl ContactRecord {
             deepest_overlap: 0.0,
             dashpot_fraction: 1.0,
             tangential_stiffness: 0.0,
-            mean_history: TangentialHistory::NONE,
+            mean_history: TangentialHistory::default(),
             history: Vec::new(),
             next_history: Vec::new(),
             patch: ContactPatch::default(),
@@ -140,7 +137,7 @@ impl ContactRecord {
         self.in_contact = false;
         self.dashpot_fraction = 1.0;
         self.tangential_stiffness = 0.0;
-        self.mean_history = TangentialHistory::NONE;
+        self.mean_history = TangentialHistory::default();
         self.history.clear();
         self.loads = PairLoads {
             lever_arm: self.loads.lever_arm,
@@ -154,68 +151,40 @@ impl ContactRecord {
         self.deepest_overlap = 0.0;
         self.patch.reset();
     }
-    /// Prepares the record for another pair; only the buffers are reused.
-    fn reuse(&mut self, key: PairKey) {
-        self.end_contact();
-        self.begin_step();
-        self.loads = PairLoads::default();
-        self.key = key;
-    }
 }
 
-/// Replaces `records` by one record for each of the ascending `keys`.
-///
-/// Records whose key remains are kept; `spare` takes the others and provides buffers for new ones.
-/// `old` is a buffer.
-pub(in crate::dem) fn update_records(
-    records: &mut Vec<ContactRecord>,
-    old: &mut Vec<ContactRecord>,
-    spare: &mut Vec<ContactRecord>,
-    keys: &[PairKey],
-) {
-    std::mem::swap(records, old);
-    let mut previous = old.drain(..).peekable();
+/// Updates the records to one for each of the ascending `keys`. The history of a pair that is
+/// still listed is kept.
+pub(in crate::dem) fn update_records(records: &mut Vec<ContactRecord>, keys: &[PairKey]) {
+    records.retain(|record| keys.binary_search(&record.key).is_ok());
+    let kept = records.len();
     for &key in keys {
-        while let Some(gone) = previous.next_if(|record| record.key < key) {
-            spare.push(gone);
+        if records[..kept].binary_search_by_key(&key, |record| record.key).is_err() {
+            records.push(ContactRecord::new(key));
         }
-        let kept = previous.next_if(|record| record.key == key);
-        records.push(kept.unwrap_or_else(|| match spare.pop() {
-            Some(mut record) => {
-                record.reuse(key);
-                record
-            }
-            None => ContactRecord::new(key),
-        }));
     }
-    spare.extend(previous);
+    records.sort_unstable_by_key(|record| record.key);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::dem::enclosure::Partner;
-    use glam::IVec3;
 
     fn key((grain, partner): (u32, usize)) -> PairKey {
-        PairKey { grain, partner: Partner::Grain(partner), image: IVec3::ZERO }
+        PairKey { grain, partner: Partner::Grain(partner), image: [0; 3] }
     }
 
     #[test]
     fn updating_keeps_the_records_of_pairs_that_remain() {
-        let (mut records, mut old, mut spare) = (Vec::new(), Vec::new(), Vec::new());
-        let mut update = |records: &mut Vec<ContactRecord>, pairs: [(u32, usize); 3]| {
-            update_records(records, &mut old, &mut spare, &pairs.map(key));
-            spare.len()
-        };
-        update(&mut records, [(0, 1), (0, 2), (1, 2)]);
+        let mut records = Vec::new();
+        update_records(&mut records, &[(0, 1), (0, 2), (1, 2)].map(key));
         records[1].in_contact = true;
         records[2].in_contact = true;
-        let spare = update(&mut records, [(0, 2), (0, 3), (1, 3)]);
+        update_records(&mut records, &[(0, 2), (0, 3), (1, 3)].map(key));
         let in_contact: Vec<_> = records.iter().map(|r| r.in_contact).collect();
         assert_eq!(in_contact, [true, false, false]);
         let keys: Vec<_> = records.iter().map(|r| r.key).collect();
         assert_eq!(keys, [(0, 2), (0, 3), (1, 3)].map(key));
-        assert_eq!(spare, 0);
     }
 }

@@ -6,9 +6,12 @@
 //! the number of nodes; a single point receives Eq. 9. Friction is an incremental spring with
 //! Coulomb's bound (Eqs 12-15).
 
+use std::sync::Arc;
+
 use glam::{DQuat, DVec3};
 
-use super::law::{ContactCoefficients, ContactParams, PairProperties, SelectedLaw};
+use super::law::{ContactCoefficients, ContactLaw, PairProperties};
+use super::parameters::ContactParams;
 use super::{ContactRecord, PairLoads, TangentialHistory};
 use crate::dem::search::{ClosestPoint, ContactPoint};
 use crate::math::{Load, RigidVelocity};
@@ -54,17 +57,17 @@ impl PatchMean {
 }
 
 /// Contact model: the force law, Coulomb friction and lubrication.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(in crate::dem) struct ContactModel {
     /// Parameters.
     pub params: ContactParams,
-    law: SelectedLaw,
+    law: Arc<dyn ContactLaw>,
 }
 
 impl ContactModel {
     /// Model with these parameters.
     pub fn new(params: ContactParams) -> ContactModel {
-        ContactModel { params, law: SelectedLaw::new(&params) }
+        ContactModel { params, law: params.force_law() }
     }
 
     /// Largest gap at which a pair interacts [m], by lubrication; zero without it.
@@ -75,7 +78,7 @@ impl ContactModel {
 
     /// Duration of an undamped contact [s] that is closing at `speed` [m/s] at `overlap` [m].
     pub fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
-        self.law.get().contact_time(pair, speed, overlap)
+        self.law.contact_time(pair, speed, overlap)
     }
 
     /// Evaluates the loads of a pair at the end of a sub-step of `step` [s] into `record.loads` and
@@ -95,7 +98,7 @@ impl ContactModel {
             }
             return;
         };
-        let at = self.law.get().coefficients(properties, mean.overlap);
+        let at = self.law.coefficients(properties, mean.overlap);
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
@@ -143,7 +146,7 @@ impl ContactModel {
             // The local closing speed also damps rocking on a flat face.
             let approach =
                 relative_velocity(&pair.end_of_step, point, pair.branch).dot(point.normal);
-            let normal_force = self.law.get().normal_force(at, damping, approach);
+            let normal_force = self.law.normal_force(at, damping, approach);
             let mut force = -(normal_force * share * scale) * point.normal;
             if friction.stiffness > 0.0 && friction.coefficient > 0.0 {
                 while record.history.get(known).is_some_and(|h| h.id < point.id) {

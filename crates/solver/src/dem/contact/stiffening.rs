@@ -1,8 +1,7 @@
 //! Stiffness that keeps an impact within a given overlap.
 
-use super::law::{
-    BodyProperties, ContactLawKind, ContactMaterial, ContactParams, PairProperties, SelectedLaw,
-};
+use super::law::{BodyProperties, ContactMaterial, PairProperties};
+use super::parameters::{ContactLawKind, ContactParams};
 use crate::dem::grain::Grain;
 
 impl ContactParams {
@@ -24,20 +23,15 @@ impl ContactParams {
             inverse_mass: grain.inverse_mass(self.added_density),
             ..BodyProperties::of(grain)
         };
-        let pair = match partner {
-            Some(partner) => PairProperties::of_grains(&body(grain), &body(partner)),
-            None => {
-                let wall = ContactMaterial::new(&self.wall_material);
-                PairProperties::with_wall(&body(grain), &wall)
-            }
-        };
+        let wall = ContactMaterial::new(&self.wall_material);
+        let pair = PairProperties::new(&body(grain), partner.map(body).as_ref(), &wall);
         // Overlap ~ speed^n and stiffness^(-n / 2).
         let n = match self.law {
             ContactLawKind::Linear => 1.0,
             ContactLawKind::HertzMindlin => 0.8,
         };
-        let law = SelectedLaw::new(self);
-        let of_speed = |speed: f64| law.get().impact_overlap(&pair, speed);
+        let law = self.force_law();
+        let of_speed = |speed: f64| law.impact_overlap(&pair, speed);
         let stored = (now / of_speed(1.0)).powf(1.0 / n);
         let overlap = of_speed(stored.hypot(speed));
         (overlap / wanted).powf(2.0 / n)
@@ -50,7 +44,7 @@ mod tests {
     use grainwake_shape::analytic::sphere;
 
     use super::*;
-    use crate::dem::grain::Material;
+    use crate::dem::material::Material;
 
     #[test]
     fn the_stiffened_contact_has_the_wanted_overlap() {

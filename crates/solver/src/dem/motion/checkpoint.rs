@@ -6,7 +6,6 @@
 
 use std::io::{self, Read, Write};
 
-use glam::IVec3;
 use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
 use super::ContactDynamics;
@@ -121,7 +120,7 @@ impl ContactDynamics {
 fn encode_record(out: &mut Encoder, record: &ContactRecord) -> io::Result<()> {
     out.u64(u64::from(record.key.grain))?;
     encode_partner(out, record.key.partner)?;
-    for periods in record.key.image.to_array() {
+    for periods in record.key.image {
         out.u64(periods as i64 as u64)?;
     }
     out.vector(record.mean_history.normal)?;
@@ -141,9 +140,9 @@ fn encode_record(out: &mut Encoder, record: &ContactRecord) -> io::Result<()> {
 fn decode_record(input: &mut Decoder, grains: usize, version: u8) -> io::Result<ContactRecord> {
     let grain = decode_grain(input, grains)? as u32;
     let partner = decode_partner(input, grains)?;
-    let mut image = IVec3::ZERO;
-    for axis in 0..3 {
-        image[axis] = i32::try_from(input.u64()? as i64).map_err(|_| damaged("image of a pair"))?;
+    let mut image = [0; 3];
+    for periods in &mut image {
+        *periods = i32::try_from(input.u64()? as i64).map_err(|_| damaged("image of a pair"))?;
     }
     let mut record = ContactRecord::new(PairKey { grain, partner, image });
     record.in_contact = true;

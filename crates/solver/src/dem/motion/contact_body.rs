@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, IVec3};
 use grainwake_shape::Shape;
 
 use super::integrator::{EffectiveInertia, GrainResponse, HalfStepVelocity};
@@ -10,7 +10,8 @@ use crate::dem::contact::{
     BodyProperties, ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties,
 };
 use crate::dem::enclosure::{Enclosure, PairKey, Partner};
-use crate::dem::grain::{Grain, Material};
+use crate::dem::grain::Grain;
+use crate::dem::material::Material;
 use crate::dem::search::{NodeTree, PosedShape};
 use crate::math::{Load, RigidVelocity};
 
@@ -151,11 +152,11 @@ pub(super) fn pair_properties(
     bodies: &[ContactBody],
     wall: &ContactMaterial,
 ) -> PairProperties {
-    let a = bodies[key.grain as usize].properties();
-    match key.partner {
-        Partner::Grain(j) => PairProperties::of_grains(&a, &bodies[j].properties()),
-        Partner::Wall { .. } => PairProperties::with_wall(&a, wall),
-    }
+    let partner = match key.partner {
+        Partner::Grain(j) => Some(bodies[j].properties()),
+        Partner::Wall { .. } => None,
+    };
+    PairProperties::new(&bodies[key.grain as usize].properties(), partner.as_ref(), wall)
 }
 
 /// Quantities that the evaluation of all pairs shares.
@@ -190,7 +191,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
     };
     let closest = match record.key.partner {
         Partner::Grain(j) => {
-            let image = record.key.image.as_dvec3() * context.enclosure.period();
+            let image = IVec3::from(record.key.image).as_dvec3() * context.enclosure.period();
             let b = bodies[j].posed_shape(grains[j].pose.position + image);
             pair.branch = a.position - b.position;
             pair.mid_step[1] = bodies[j].mid_step;

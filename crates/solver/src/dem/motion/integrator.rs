@@ -29,6 +29,16 @@ pub(super) enum EffectiveInertia<'a> {
     WithFluid(&'a GrainResponse),
 }
 
+impl EffectiveInertia<'_> {
+    /// Acceleration of the centroid under `load` [m/s^2].
+    fn acceleration(&self, load: &Load) -> DVec3 {
+        match self {
+            EffectiveInertia::Grain(inverse_mass) => load.force * *inverse_mass,
+            EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
+        }
+    }
+}
+
 /// First half step: velocities to n+1/2 and pose to n+1.
 pub(super) fn first_half_step(
     grain: &mut Grain,
@@ -41,11 +51,7 @@ pub(super) fn first_half_step(
     let HalfStepVelocity { mut middle, mut end } = HalfStepVelocity::default();
     match grain.translation {
         MotionConstraint::Free => {
-            let acceleration = match inertia {
-                EffectiveInertia::Grain(inverse_mass) => load.force * inverse_mass,
-                EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
-            };
-            let change = half * (acceleration - damping * grain.velocity);
+            let change = half * (inertia.acceleration(load) - damping * grain.velocity);
             middle.linear = grain.velocity + change;
             end.linear = middle.linear + change;
         }
@@ -95,13 +101,8 @@ pub(super) fn second_half_step(
 ) {
     let half = 0.5 * step;
     let damping_factor = 1.0 + damping * half;
-    let (force, torque) = (load.force, load.torque);
     if grain.translation == MotionConstraint::Free {
-        let acceleration = match inertia {
-            EffectiveInertia::Grain(inverse_mass) => force * inverse_mass,
-            EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
-        };
-        grain.velocity = (middle.linear + half * acceleration) / damping_factor;
+        grain.velocity = (middle.linear + half * inertia.acceleration(load)) / damping_factor;
     }
     if grain.rotation == MotionConstraint::Free {
         grain.angular_velocity = match inertia {
@@ -110,7 +111,7 @@ pub(super) fn second_half_step(
                 let omega = half_step_implicit(
                     grain.principal_inertia(),
                     to_body * middle.angular,
-                    to_body * torque,
+                    to_body * load.torque,
                     damping,
                     half,
                 );

@@ -41,8 +41,6 @@ pub struct ContactDynamics {
     bodies: Vec<ContactBody>,
     broad_phase: BroadPhase,
     spheres: Vec<BoundingSphere>,
-    old_records: Vec<ContactRecord>,
-    spare_records: Vec<ContactRecord>,
     state_before: StateBefore,
 }
 
@@ -62,8 +60,6 @@ impl ContactDynamics {
             bodies: Vec::new(),
             broad_phase: BroadPhase::default(),
             spheres: Vec::new(),
-            old_records: Vec::new(),
-            spare_records: Vec::new(),
             state_before: StateBefore::default(),
         }
     }
@@ -132,27 +128,18 @@ impl ContactDynamics {
             }
         }
         ContactBody::synchronise(&mut self.bodies, grains);
-        let period = self.enclosure.period();
-        let periods_moved = |i: usize| -> IVec3 {
-            let (Some(last), Some(grain)) = (self.last_positions.get(i), grains.get(i)) else {
-                return IVec3::ZERO;
-            };
-            let displacement = grain.pose.position - *last;
-            IVec3::from_array([0, 1, 2].map(|axis| {
-                if period[axis] > 0.0 {
-                    let periods = (displacement[axis] / period[axis]).round();
-                    periods.clamp(-1e6, 1e6) as i32
-                } else {
-                    0
-                }
-            }))
+        let (last, enclosure) = (&self.last_positions, &self.enclosure);
+        let periods_moved = |i: usize| match (last.get(i), grains.get(i)) {
+            (Some(last), Some(grain)) => enclosure.periods(grain.pose.position - *last, f64::round),
+            _ => IVec3::ZERO,
         };
         let mut shifted = false;
         for record in &mut self.records {
             record.begin_step();
             if let Partner::Grain(j) = record.key.partner {
                 let shift = periods_moved(record.key.grain as usize) - periods_moved(j);
-                record.key.image = record.key.image.wrapping_add(shift);
+                let image = IVec3::from(record.key.image).wrapping_add(shift);
+                record.key.image = image.to_array();
                 shifted |= shift != IVec3::ZERO;
             }
         }

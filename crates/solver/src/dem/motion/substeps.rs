@@ -114,12 +114,7 @@ impl ContactDynamics {
             });
         }
         self.broad_phase.search(&self.spheres, &self.enclosure);
-        update_records(
-            &mut self.records,
-            &mut self.old_records,
-            &mut self.spare_records,
-            &self.broad_phase.pairs,
-        );
+        update_records(&mut self.records, &self.broad_phase.pairs);
     }
 
     /// Whether a grain has moved farther than the pair list allows.

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3, IVec3};
 
+use super::shifts;
 use super::surface::{DescentLimits, PartnerField, SurfacePoint, minimise_distance};
 use crate::dem::enclosure::{Enclosure, Partner, WallFace};
 use crate::dem::grain::Grain;
@@ -40,11 +41,11 @@ pub struct Outside {
 /// Point of the grain's surface with the smallest distance in `field`: descent from the closest
 /// node.
 fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
-    let nodes = owner.shape.nodes();
     let mut best: Option<(f64, DVec3)> = None;
-    for node in nodes {
-        let distance = field.distance(node.position);
-        if best.is_none_or(|(least, _)| distance < least) {
+    for node in owner.shape.nodes() {
+        let least = best.map_or(f64::INFINITY, |(least, _)| least);
+        let distance = field.distance_within(node.position, least);
+        if distance < least {
             best = Some((distance, node.position));
         }
     }
@@ -80,20 +81,13 @@ fn gap_of_images(
     let nearest = enclosure.nearest_image(branch);
     let radii = a.shape.bounding_radius() + b.shape.bounding_radius();
     // Images beyond the nearest one matter for grains as large as the box.
-    let most = [0, 1, 2].map(|axis| {
+    let most = IVec3::from_array([0, 1, 2].map(|axis| {
         if period[axis] > 0.0 { (radii / period[axis]).ceil().min(4.0) as i32 + 1 } else { 0 }
-    });
+    }));
     let mut images: Vec<(f64, DVec3)> = Vec::new();
-    for k in -most[2]..=most[2] {
-        for j in -most[1]..=most[1] {
-            for i in -most[0]..=most[0] {
-                let shift = IVec3::new(i, j, k);
-                if skip != Some(shift) {
-                    let branch = nearest + shift.as_dvec3() * period;
-                    images.push((branch.length() - radii, branch));
-                }
-            }
-        }
+    for shift in shifts(-most, most).filter(|shift| skip != Some(*shift)) {
+        let branch = nearest + shift.as_dvec3() * period;
+        images.push((branch.length() - radii, branch));
     }
     images.sort_by(|x, y| x.0.total_cmp(&y.0));
     let mut best = limit;

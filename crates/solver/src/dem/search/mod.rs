@@ -8,11 +8,12 @@
 mod gap;
 mod narrow_phase;
 mod node_scan;
+mod node_tree;
 mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint, PosedShape};
-pub(super) use surface::NodeTree;
+pub(super) use node_tree::NodeTree;
 
 use glam::{DVec3, IVec3};
 
@@ -21,6 +22,8 @@ use super::enclosure::{Enclosure, PairKey, Partner};
 /// Largest image distance in the search [periods]. Grains several times larger than a periodic box
 /// are not supported.
 const MAX_PERIODS: i32 = 4;
+/// Largest number of a cell along an axis; spheres farther away share the last cell.
+const CELL_LIMIT: DVec3 = DVec3::splat(1e9);
 
 /// Bounding sphere of a grain with a margin, such as its displacement until the next search.
 #[derive(Clone, Copy, Debug)]
@@ -34,185 +37,103 @@ pub(crate) struct BoundingSphere {
 /// Centre of a bounding sphere or of one of its periodic images.
 #[derive(Clone, Copy, Debug)]
 struct ImageCentre {
+    /// Cell along z, y and x.
+    cell: [i32; 3],
     position: DVec3,
     grain: u32,
     /// Periods from the grain's own position to this centre.
     image: IVec3,
+    /// Whether this is the image inside the box.
+    inside: bool,
 }
 
 /// Cell-list search with its buffers, reused by the next search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BroadPhase {
+    /// All centres, sorted by cell.
     centres: Vec<ImageCentre>,
-    /// Index into `centres` of the image inside the box, by grain; `None` if it is not finite.
-    inside: Vec<Option<u32>>,
-    sorted: Vec<ImageCentre>,
-    cell_starts: Vec<u32>,
-    cells: Vec<u32>,
     /// Pairs that may touch, in ascending order.
     pub pairs: Vec<PairKey>,
-}
-
-/// Uniform cells around all centres.
-struct CellGrid {
-    lower: DVec3,
-    inverse_size: f64,
-    dims: [usize; 3],
-}
-
-impl CellGrid {
-    /// Cells at least `size` [m] wide around all centres, at most about eight per centre.
-    fn around(centres: &[ImageCentre], size: f64) -> CellGrid {
-        let first = centres.first().map_or(DVec3::ZERO, |c| c.position);
-        let (lower, upper) = centres.iter().fold((first, first), |(lower, upper), c| {
-            (lower.min(c.position), upper.max(c.position))
-        });
-        let extent = upper - lower;
-        let mut size = size.max(1e-9 * extent.max_element()).max(f64::MIN_POSITIVE);
-        loop {
-            let count = (extent / size).floor();
-            let dims = count.to_array().map(|c| c.min(1e9) as usize + 1);
-            if dims.iter().map(|&d| d as f64).product::<f64>() <= 8.0 * centres.len() as f64 + 64.0
-            {
-                return CellGrid { lower, inverse_size: 1.0 / size, dims };
-            }
-            size *= 1.5;
-        }
-    }
-    fn coordinates(&self, x: DVec3) -> [usize; 3] {
-        let c = (x - self.lower) * self.inverse_size;
-        [0, 1, 2].map(|axis| (c[axis].max(0.0) as usize).min(self.dims[axis] - 1))
-    }
-    fn index(&self, [i, j, k]: [usize; 3]) -> usize {
-        (k * self.dims[1] + j) * self.dims[0] + i
-    }
 }
 
 impl BroadPhase {
     /// Fills `pairs`. A sphere that is not finite is in no pair.
     pub fn search(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure) {
+        self.list_images(spheres, enclosure);
+        self.centres.sort_unstable_by_key(|centre| centre.cell);
         self.pairs.clear();
-        let largest = spheres
-            .iter()
-            .map(|sphere| sphere.radius)
-            .filter(|r| r.is_finite())
-            .fold(0.0, f64::max);
-        self.list_images(spheres, enclosure, largest);
-        let cells = CellGrid::around(&self.centres, 2.0 * largest);
-        self.sort_by_cell(&cells);
-        for (grain, sphere) in spheres.iter().enumerate() {
-            let Some(centre) = self.inside[grain] else { continue };
-            self.pair_with_neighbours(grain as u32, centre as usize, spheres, &cells);
+        for own in self.centres.iter().filter(|centre| centre.inside) {
+            let sphere = &spheres[own.grain as usize];
+            for other in centres_around(&self.centres, own.cell) {
+                let image = (other.image - own.image).to_array();
+                // Each pair is listed once; a grain may touch its own image.
+                let listed = (other.grain, image) > (own.grain, [0; 3]);
+                let limit = sphere.radius + spheres[other.grain as usize].radius;
+                if listed && own.position.distance_squared(other.position) <= limit * limit {
+                    let partner = Partner::Grain(other.grain as usize);
+                    self.pairs.push(PairKey { grain: own.grain, partner, image });
+                }
+            }
             for face in enclosure.faces() {
                 if face.distance(sphere.centre) <= sphere.radius {
-                    self.pairs.push(PairKey::wall(grain as u32, &face));
+                    self.pairs.push(PairKey::wall(own.grain, &face));
                 }
             }
         }
-    }
-
-    /// Appends the pairs of one grain with images of grains of equal or higher index.
-    fn pair_with_neighbours(
-        &mut self,
-        grain: u32,
-        centre: usize,
-        spheres: &[BoundingSphere],
-        cells: &CellGrid,
-    ) {
-        let start = self.pairs.len();
-        let own = self.centres[centre];
-        let radius = spheres[grain as usize].radius;
-        let cell = cells.coordinates(own.position);
-        let [from, to] = [
-            cell.map(|c| c.saturating_sub(1)),
-            [0, 1, 2].map(|axis| (cell[axis] + 1).min(cells.dims[axis] - 1)),
-        ];
-        for k in from[2]..=to[2] {
-            for j in from[1]..=to[1] {
-                let row = cells.index([from[0], j, k])..cells.index([to[0], j, k]) + 1;
-                let range = self.cell_starts[row.start]..self.cell_starts[row.end];
-                for other in &self.sorted[range.start as usize..range.end as usize] {
-                    let image = other.image - own.image;
-                    // Each pair is listed once; a grain may touch its own image.
-                    let listed =
-                        other.grain > grain || other.grain == grain && image.to_array() > [0, 0, 0];
-                    let limit = radius + spheres[other.grain as usize].radius;
-                    if listed && own.position.distance_squared(other.position) <= limit * limit {
-                        self.pairs.push(PairKey {
-                            grain,
-                            partner: Partner::Grain(other.grain as usize),
-                            image,
-                        });
-                    }
-                }
-            }
-        }
-        self.pairs[start..].sort_unstable();
+        self.pairs.sort_unstable();
     }
 
     /// Lists the image of every grain inside the box and the images that reach into the box.
-    fn list_images(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure, largest: f64) {
+    fn list_images(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure) {
         self.centres.clear();
-        self.inside.clear();
+        let radii = spheres.iter().map(|sphere| sphere.radius);
+        let largest = radii.filter(|radius| radius.is_finite()).fold(0.0, f64::max);
+        let cell_size = (2.0 * largest).max(f64::MIN_POSITIVE);
         let period = enclosure.period();
+        let most = IVec3::splat(MAX_PERIODS);
         for (grain, sphere) in spheres.iter().enumerate() {
             if !(sphere.centre.is_finite() && sphere.radius.is_finite()) {
-                self.inside.push(None);
                 continue;
             }
             let wrap = -enclosure.periods_outside(sphere.centre);
             let inside = sphere.centre + wrap.as_dvec3() * period;
             let reach = sphere.radius + largest;
-            let range = [0, 1, 2].map(|axis| {
-                let l = period[axis];
-                if l <= 0.0 {
-                    return (0, 0);
-                }
-                let down = ((inside[axis] - (enclosure.lower[axis] - reach)) / l).floor();
-                let up = ((enclosure.upper[axis] + reach - inside[axis]) / l).floor();
-                let limit = f64::from(MAX_PERIODS);
-                (-(down.clamp(0.0, limit) as i32), up.clamp(0.0, limit) as i32)
-            });
-            for k in range[2].0..=range[2].1 {
-                for j in range[1].0..=range[1].1 {
-                    for i in range[0].0..=range[0].1 {
-                        let shift = IVec3::new(i, j, k);
-                        if shift == IVec3::ZERO {
-                            self.inside.push(Some(self.centres.len() as u32));
-                        }
-                        self.centres.push(ImageCentre {
-                            position: inside + shift.as_dvec3() * period,
-                            grain: grain as u32,
-                            image: wrap + shift,
-                        });
-                    }
-                }
+            let down = enclosure.periods(inside - (enclosure.lower - reach), f64::floor);
+            let up = enclosure.periods(enclosure.upper + reach - inside, f64::floor);
+            for shift in shifts(-down.clamp(IVec3::ZERO, most), up.clamp(IVec3::ZERO, most)) {
+                let position = inside + shift.as_dvec3() * period;
+                // The limit keeps the numbers of neighbour cells in the range of the integers.
+                let cell = (position / cell_size).floor().clamp(-CELL_LIMIT, CELL_LIMIT).as_ivec3();
+                self.centres.push(ImageCentre {
+                    cell: [cell.z, cell.y, cell.x],
+                    position,
+                    grain: grain as u32,
+                    image: wrap + shift,
+                    inside: shift == IVec3::ZERO,
+                });
             }
         }
     }
+}
 
-    /// Counting sort of the centres by cell.
-    fn sort_by_cell(&mut self, cells: &CellGrid) {
-        let count = cells.dims.iter().product::<usize>();
-        self.cell_starts.clear();
-        self.cell_starts.resize(count + 2, 0);
-        self.cells.clear();
-        for centre in &self.centres {
-            let cell = cells.index(cells.coordinates(centre.position));
-            self.cells.push(cell as u32);
-            self.cell_starts[cell + 2] += 1;
-        }
-        for i in 2..self.cell_starts.len() {
-            self.cell_starts[i] += self.cell_starts[i - 1];
-        }
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.centres);
-        for (centre, &cell) in self.centres.iter().zip(&self.cells) {
-            let end = &mut self.cell_starts[cell as usize + 1];
-            self.sorted[*end as usize] = *centre;
-            *end += 1;
-        }
-    }
+/// Centres in the cell `[z, y, x]` and the 26 cells around it; `centres` is sorted by cell.
+fn centres_around(
+    centres: &[ImageCentre],
+    [z, y, x]: [i32; 3],
+) -> impl Iterator<Item = &ImageCentre> {
+    let row = move |k: i32, j: i32| {
+        let (first, last) = ([k, j, x - 1], [k, j, x + 1]);
+        let start = centres.partition_point(|centre| centre.cell < first);
+        centres[start..].iter().take_while(move |centre| centre.cell <= last)
+    };
+    (z - 1..=z + 1).flat_map(move |k| (y - 1..=y + 1).flat_map(move |j| row(k, j)))
+}
+
+/// All shifts in periods from `first` to `last`, both included.
+fn shifts(first: IVec3, last: IVec3) -> impl Iterator<Item = IVec3> {
+    let along = move |axis: usize| first[axis]..=last[axis];
+    along(2)
+        .flat_map(move |k| along(1).flat_map(move |j| along(0).map(move |i| IVec3::new(i, j, k))))
 }
 
 #[cfg(test)]
@@ -238,10 +159,11 @@ mod tests {
         for (i, a) in spheres.iter().enumerate() {
             for (j, b) in spheres.iter().enumerate().skip(i) {
                 for code in 0..9 * 9 * 9 {
-                    let image = IVec3::new(code % 9 - 4, code / 9 % 9 - 4, code / 81 - 4);
+                    let image = [code % 9 - 4, code / 9 % 9 - 4, code / 81 - 4];
                     let periodic = (0..3).all(|axis| enclosure.periodic[axis] || image[axis] == 0);
-                    let apart = a.centre - b.centre - image.as_dvec3() * enclosure.size();
-                    let listed = i < j || image.to_array() > [0, 0, 0];
+                    let apart =
+                        a.centre - b.centre - IVec3::from(image).as_dvec3() * enclosure.size();
+                    let listed = i < j || image > [0, 0, 0];
                     if periodic && listed && apart.length() <= a.radius + b.radius {
                         pairs.push(PairKey { grain: i as u32, partner: Partner::Grain(j), image });
                     }

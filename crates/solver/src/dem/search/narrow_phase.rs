@@ -5,8 +5,9 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
 use super::node_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_nodes};
+use super::node_tree::NodeTree;
 use super::surface::{
-    DescentLimits, GRADIENT_MARGIN, NodeTree, PartnerField, SurfacePoint, minimise_distance,
+    DescentLimits, GRADIENT_MARGIN, PartnerField, SurfacePoint, minimise_distance,
     project_to_surface,
 };
 
@@ -36,19 +37,6 @@ pub(in crate::dem) struct ClosestPoint {
     pub normal: DVec3,
 }
 
-impl ClosestPoint {
-    fn new(point: &SurfacePoint, (lever_arm, normal): (DVec3, DVec3)) -> ClosestPoint {
-        ClosestPoint { gap: point.distance, lever_arm, normal }
-    }
-
-    fn nearer(a: Option<ClosestPoint>, b: Option<ClosestPoint>) -> Option<ClosestPoint> {
-        match (a, b) {
-            (Some(a), Some(b)) => Some(if b.gap < a.gap { b } else { a }),
-            (a, b) => a.or(b),
-        }
-    }
-}
-
 /// Penetrating points of a pair, with the buffers of the narrow phase.
 #[derive(Debug, Default)]
 pub(in crate::dem) struct ContactPatch {
@@ -59,22 +47,6 @@ pub(in crate::dem) struct ContactPatch {
     /// Results of the last search of each surface.
     memory: [SurfaceMemory; 2],
     found: Vec<PenetratingPoint>,
-}
-
-impl Clone for ContactPatch {
-    fn clone(&self) -> ContactPatch {
-        let mut copy = ContactPatch::default();
-        copy.clone_from(self);
-        copy
-    }
-    /// Copies a patch into the buffers of this one.
-    fn clone_from(&mut self, source: &ContactPatch) {
-        let ContactPatch { points, separation, memory, found } = self;
-        points.clone_from(&source.points);
-        *separation = source.separation;
-        memory.clone_from(&source.memory);
-        found.clone_from(&source.found);
-    }
 }
 
 impl ContactPatch {
@@ -110,18 +82,17 @@ impl ContactPatch {
         let to_b = b.rotation.transpose();
         let rotation = to_b * a.rotation;
         let field_of_b = PartnerField::grain(b.shape, rotation, to_b * branch);
-        let scan_a = scan_surface(a, &field_of_b, reach, &mut self.memory[0], &mut self.found);
-        let to_space = |p: &SurfacePoint| (a.rotation * p.position, -(a.rotation * p.normal));
-        let closest_a = scan_a.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
-        self.append_points(0, to_space);
+        let (bound_a, closest_a) = self.search_surface(0, a, &field_of_b, reach, |p| {
+            (a.rotation * p.position, -(a.rotation * p.normal))
+        });
         let translation = -(a.rotation.transpose() * branch);
         let field_of_a = PartnerField::grain(a.shape, rotation.transpose(), translation);
-        let scan_b = scan_surface(b, &field_of_a, reach, &mut self.memory[1], &mut self.found);
-        let to_space = |p: &SurfacePoint| (b.rotation * p.position - branch, b.rotation * p.normal);
-        let closest_b = scan_b.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
-        self.append_points(SECOND_GRAIN, to_space);
-        let node_bound = scan_a.separation.max(scan_b.separation);
-        self.finish(ClosestPoint::nearer(closest_a, closest_b), node_bound, reach)
+        let (bound_b, closest_b) = self.search_surface(1, b, &field_of_a, reach, |p| {
+            (b.rotation * p.position - branch, b.rotation * p.normal)
+        });
+        let closest = closest_a.into_iter().chain(closest_b);
+        let closest = closest.min_by(|a, b| a.gap.total_cmp(&b.gap));
+        self.finish(closest, bound_a.max(bound_b), reach)
     }
 
     /// Finds the penetrating points of a grain in a wall with the unit normal `inward`, at the
@@ -140,11 +111,37 @@ impl ContactPatch {
             return None;
         }
         let wall = PartnerField::HalfSpace { normal: a.rotation.transpose() * inward, offset };
-        let scan = scan_surface(a, &wall, reach, &mut self.memory[0], &mut self.found);
-        let to_space = |p: &SurfacePoint| (a.rotation * p.position, -inward);
-        self.append_points(0, to_space);
-        let closest = scan.closest.map(|p| ClosestPoint::new(&p, to_space(&p)));
-        self.finish(closest, scan.separation, reach)
+        let (bound, closest) =
+            self.search_surface(0, a, &wall, reach, |p| (a.rotation * p.position, -inward));
+        self.finish(closest, bound, reach)
+    }
+
+    /// Searches the surface of `owner`, grain 0 or 1 of the pair, and appends its penetrating
+    /// points.
+    ///
+    /// `to_space` gives the lever arm from the centroid of the first grain and the normal out of
+    /// it. Returns a lower bound of the distance between surface and partner [m], and the closest
+    /// point if it may be nearer than `reach` [m].
+    fn search_surface(
+        &mut self,
+        grain: usize,
+        owner: &PosedShape,
+        partner: &PartnerField,
+        reach: f64,
+        to_space: impl Fn(&SurfacePoint) -> (DVec3, DVec3),
+    ) -> (f64, Option<ClosestPoint>) {
+        let (bound, closest) =
+            scan_surface(owner, partner, reach, &mut self.memory[grain], &mut self.found);
+        self.points.extend(self.found.iter().map(|found| {
+            let (lever_arm, normal) = to_space(&found.point);
+            let id = if grain == 0 { found.id } else { found.id | SECOND_GRAIN };
+            ContactPoint { id, overlap: -found.point.distance, area: found.area, lever_arm, normal }
+        }));
+        let closest = closest.map(|point| {
+            let (lever_arm, normal) = to_space(&point);
+            ClosestPoint { gap: point.distance, lever_arm, normal }
+        });
+        (bound, closest)
     }
 
     /// Sets the separation after a search that found the closest point, if near; returns that point
@@ -160,28 +157,10 @@ impl ContactPatch {
         self.separation = if self.points.is_empty() { bound - reach } else { 0.0 };
         closest.filter(|point| point.gap < reach)
     }
-
-    /// Appends the points of the last scan, with lever arm and normal from `to_space`.
-    fn append_points(
-        &mut self,
-        grain_bit: u32,
-        to_space: impl Fn(&SurfacePoint) -> (DVec3, DVec3),
-    ) {
-        self.points.extend(self.found.iter().map(|found| {
-            let (lever_arm, normal) = to_space(&found.point);
-            ContactPoint {
-                id: found.id | grain_bit,
-                overlap: -found.point.distance,
-                area: found.area,
-                lever_arm,
-                normal,
-            }
-        }));
-    }
 }
 
 /// Bit that marks the points of the second grain in a point identifier.
-pub(super) const SECOND_GRAIN: u32 = 1 << 31;
+const SECOND_GRAIN: u32 = 1 << 31;
 /// Identifier of the deepest point, which is not a node. Node n has the identifier 2 n and its
 /// mirror point 2 n + 1.
 const DEEPEST_POINT: u32 = SECOND_GRAIN - 1;
@@ -214,26 +193,19 @@ pub(in crate::dem) struct PosedShape<'a> {
     pub position: DVec3,
 }
 
-/// Result of testing the nodes of one grain in the field of its partner.
-pub(super) struct SurfaceScan {
-    /// Lower bound of the distance between surface and partner [m].
-    pub separation: f64,
-    /// Closest point of the surface, if it may be nearer than the reach of the search.
-    pub closest: Option<SurfacePoint>,
-}
-
-/// Tests the nodes of `owner` in the field of its partner (Eq. 7).
+/// Tests the nodes of `owner` in the field of its partner (Eq. 7). Penetrating points go to `found`
+/// in ascending identifier.
 ///
-/// Penetrating points go to `found` in ascending identifier. The closest point of the surface is
-/// determined if it may be nearer than `reach` [m]. `memory`, filled by the last search in the same
-/// step, only saves work.
+/// Returns a lower bound of the distance between surface and partner [m], and the closest point of
+/// the surface if it may be nearer than `reach` [m]. `memory`, filled by the last search in the
+/// same step, only saves work.
 fn scan_surface(
     owner: &PosedShape,
     partner: &PartnerField,
     reach: f64,
     memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
-) -> SurfaceScan {
+) -> (f64, Option<SurfacePoint>) {
     let tree = owner.tree;
     let range = NODE_COVERAGE * tree.spacing + reach;
     let nearest = scan_candidates(tree, partner, memory, found)
@@ -245,7 +217,7 @@ fn scan_surface(
         .filter(|_| nearest.distance < range)
         .and_then(|index| SurfacePoint::at(partner, tree.nodes[index as usize].position));
     let Some(start) = start else {
-        return SurfaceScan { separation, closest: None };
+        return (separation, None);
     };
     let limits = DescentLimits {
         stride: tree.spacing,
@@ -263,7 +235,7 @@ fn scan_surface(
             point: closest,
         });
     }
-    SurfaceScan { separation, closest: Some(closest) }
+    (separation, Some(closest))
 }
 
 /// Shares the area of each node with its mirror image about the deepest point, if the image lies on

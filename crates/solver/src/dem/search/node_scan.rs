@@ -1,10 +1,12 @@
 //! Nodes of one grain that penetrate its partner, and the nearest node: by the hierarchy of the
 //! nodes, or within a step by the candidates of the last search.
 
-use super::surface::{NodeTree, PartnerField, SurfacePoint};
+use super::node_tree::NodeTree;
+use super::surface::{PartnerField, SurfacePoint};
 
 /// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
 const CANDIDATE_RANGE: f64 = 0.5;
+
 /// Penetrating point in the principal frame of the grain on whose surface it lies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenetratingPoint {
@@ -29,26 +31,11 @@ pub(super) struct SurfaceMemory {
     pub nearest: Option<u32>,
 }
 
-impl Clone for SurfaceMemory {
-    fn clone(&self) -> SurfaceMemory {
-        let mut copy = SurfaceMemory::default();
-        copy.clone_from(self);
-        copy
-    }
-    /// Copies a memory into the buffer of this one.
-    fn clone_from(&mut self, source: &SurfaceMemory) {
-        let mut candidates = std::mem::take(&mut self.candidates);
-        candidates.clone_from(&source.candidates);
-        *self = SurfaceMemory { candidates, ..*source };
-    }
-}
-
 impl SurfaceMemory {
     /// Forgets all but the buffer.
     pub fn reset(&mut self) {
         self.candidates.clear();
-        let candidates = std::mem::take(&mut self.candidates);
-        *self = SurfaceMemory { candidates, ..SurfaceMemory::default() };
+        (self.slack, self.nearest) = (0.0, None);
     }
 }
 
@@ -88,7 +75,7 @@ pub(super) fn scan_candidates(
     nearest.index.is_some().then_some(nearest)
 }
 
-/// Tests a node unless it is farther than `reach` [m] from the partner; returns its distance.
+/// Tests a node; returns its distance, or infinity if it exceeds `reach` [m].
 fn test_node(
     tree: &NodeTree,
     partner: &PartnerField,
@@ -96,16 +83,16 @@ fn test_node(
     reach: f64,
     nearest: &mut NearestNode,
     found: &mut Vec<PenetratingPoint>,
-) -> Option<f64> {
+) -> f64 {
     let node = &tree.nodes[index as usize];
-    let distance = partner.distance_within(node.position, reach)?;
+    let distance = partner.distance_within(node.position, reach);
     nearest.update(distance, index);
     if distance < 0.0
         && let Some(point) = SurfacePoint::at(partner, node.position)
     {
         found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
     }
-    Some(distance)
+    distance
 }
 
 /// Collects the penetrating nodes and returns the nearest node within `range` [m]; lists the
@@ -123,7 +110,7 @@ pub(super) fn scan_nodes(
     *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
-        nearest.update(partner.distance(node.position), index);
+        nearest.update(partner.distance_within(node.position, range), index);
     }
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
@@ -135,8 +122,7 @@ pub(super) fn scan_nodes(
         if cluster.is_leaf(cluster_index) {
             for index in cluster.nodes.0..cluster.nodes.1 {
                 let reach = nearest.distance.max(*slack);
-                let distance = test_node(tree, partner, index, reach, &mut nearest, found);
-                if distance.is_some_and(|distance| distance <= *slack) {
+                if test_node(tree, partner, index, reach, &mut nearest, found) <= *slack {
                     candidates.push(index);
                 }
             }

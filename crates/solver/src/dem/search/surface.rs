@@ -1,83 +1,8 @@
-//! Surface of a grain and the distance field of its partner: hierarchy of the surface nodes, field
-//! in the frame of the grain, and the point of the surface with the smallest distance.
+//! Surface of a grain in the distance field of its partner: the field in the frame of the grain,
+//! and the point of the surface with the smallest distance.
 
 use glam::{DMat3, DVec3};
-use grainwake_shape::{Field, Shape, SurfaceNode};
-
-/// Most nodes of a leaf.
-const LEAF: usize = 8;
-
-/// Bounding sphere of a range of nodes.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct NodeCluster {
-    /// Centre, principal frame [m].
-    pub centre: DVec3,
-    /// Radius [m].
-    pub radius: f64,
-    /// Range of nodes: first, and one past the last.
-    pub nodes: (u32, u32),
-    /// Index of the next cluster in depth-first order outside this subtree.
-    pub skip: u32,
-}
-
-impl NodeCluster {
-    /// Whether this cluster, at `index`, has no sub-clusters.
-    pub fn is_leaf(&self, index: usize) -> bool {
-        self.skip as usize == index + 1
-    }
-}
-
-/// Nodes and clusters of one shape.
-#[derive(Clone, Debug)]
-pub(in crate::dem) struct NodeTree {
-    /// Nodes in the order of the leaves.
-    pub nodes: Vec<SurfaceNode>,
-    /// Clusters in depth-first order.
-    pub clusters: Vec<NodeCluster>,
-    /// Node spacing: square root of the mean node area [m].
-    pub spacing: f64,
-}
-
-impl NodeTree {
-    /// Builds the hierarchy of a shape by halving along the longest extent.
-    pub fn new(shape: &Shape) -> NodeTree {
-        let nodes = shape.nodes().to_vec();
-        let area: f64 = nodes.iter().map(|n| n.area).sum();
-        let spacing = (area / nodes.len().max(1) as f64).sqrt();
-        let mut tree = NodeTree { nodes, clusters: Vec::new(), spacing };
-        if !tree.nodes.is_empty() {
-            tree.split(0, tree.nodes.len());
-        }
-        tree
-    }
-
-    fn split(&mut self, from: usize, to: usize) {
-        let nodes = &mut self.nodes[from..to];
-        let start = nodes[0].position;
-        let (lower, upper) = nodes.iter().fold((start, start), |(lower, upper), n| {
-            (lower.min(n.position), upper.max(n.position))
-        });
-        let centre = 0.5 * (lower + upper);
-        let radius = nodes.iter().map(|n| n.position.distance(centre)).fold(0.0, f64::max);
-        let index = self.clusters.len();
-        self.clusters.push(NodeCluster {
-            centre,
-            radius,
-            nodes: (from as u32, to as u32),
-            skip: 0,
-        });
-        if to - from > LEAF {
-            let extent = upper - lower;
-            let axis =
-                (0..3).fold(0, |best, axis| if extent[axis] > extent[best] { axis } else { best });
-            nodes.sort_by(|a, b| a.position[axis].total_cmp(&b.position[axis]));
-            let middle = from + (to - from) / 2;
-            self.split(from, middle);
-            self.split(middle, to);
-        }
-        self.clusters[index].skip = self.clusters.len() as u32;
-    }
-}
+use grainwake_shape::{Field, Shape};
 
 /// Safety factor on a distance from a sampled field, whose gradient may slightly exceed one.
 pub(super) const GRADIENT_MARGIN: f64 = 1.1;
@@ -126,22 +51,16 @@ impl<'a> PartnerField<'a> {
             PartnerField::HalfSpace { normal, offset } => (normal.dot(x) + offset, *normal),
         }
     }
-    /// Signed distance [m] at `x`, or `None` if a bound shows that it exceeds `reach` [m].
-    pub fn distance_within(&self, x: DVec3, reach: f64) -> Option<f64> {
+    /// Signed distance [m] at `x`, or infinity if a bound shows that it exceeds `reach` [m].
+    pub fn distance_within(&self, x: DVec3, reach: f64) -> f64 {
         match self {
             PartnerField::Shape { shape, rotation, translation, .. } => {
                 let y = *rotation * x + *translation;
                 let outside = (shape.lower() - y).max(y - shape.upper()).max(DVec3::ZERO);
-                (outside.length_squared() <= reach * reach).then(|| shape.distance(y))
-            }
-            PartnerField::HalfSpace { normal, offset } => Some(normal.dot(x) + offset),
-        }
-    }
-    /// Signed distance [m] at `x`.
-    pub fn distance(&self, x: DVec3) -> f64 {
-        match self {
-            PartnerField::Shape { shape, rotation, translation, .. } => {
-                shape.distance(*rotation * x + *translation)
+                if outside.length_squared() > reach * reach {
+                    return f64::INFINITY;
+                }
+                shape.distance(y)
             }
             PartnerField::HalfSpace { normal, offset } => normal.dot(x) + offset,
         }
@@ -307,25 +226,6 @@ fn compass_search(
 mod tests {
     use super::*;
     use glam::DMat3;
-
-    #[test]
-    fn clusters_bound_their_nodes_and_leaves_cover_each_node_once() {
-        let shape = Shape::sphere(1.0, 1000);
-        let tree = NodeTree::new(&shape);
-        let mut seen = 0;
-        for (index, cluster) in tree.clusters.iter().enumerate() {
-            let run = &tree.nodes[cluster.nodes.0 as usize..cluster.nodes.1 as usize];
-            assert!(
-                run.iter()
-                    .all(|n| n.position.distance(cluster.centre) <= cluster.radius * (1.0 + 1e-12))
-            );
-            if cluster.is_leaf(index) {
-                assert_eq!(cluster.nodes.0, seen);
-                seen = cluster.nodes.1;
-            }
-        }
-        assert_eq!(seen as usize, shape.nodes().len());
-    }
 
     #[test]
     fn the_deepest_point_of_a_sphere_in_a_wall_and_in_a_sphere() {

@@ -208,7 +208,7 @@ impl NeighbourSearch {
             let Partner::Grain(other) = pair.partner else {
                 continue;
             };
-            let (grain, [x, y, z]) = (pair.grain as usize, pair.image.to_array());
+            let (grain, [x, y, z]) = (pair.grain as usize, pair.image);
             for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
                 let image = [z, y, x].map(|periods| sign * periods);
                 self.pairs.push(NeighbourPair { grain, other, image });

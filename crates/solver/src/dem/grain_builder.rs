@@ -1,0 +1,58 @@
+//! Grains at set-up: constructor and the changes that follow it.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::Shape;
+
+use super::grain::{Grain, MotionConstraint};
+use super::material::Material;
+use crate::math::Pose;
+
+impl Grain {
+    /// Free grain of `density` [kg/m^3] at rest at the origin.
+    pub fn new(shape: impl Into<Arc<Shape>>, density: f64) -> Grain {
+        Grain {
+            shape: shape.into(),
+            density,
+            material: Material::default(),
+            pose: Pose { position: DVec3::ZERO, orientation: DQuat::IDENTITY },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: MotionConstraint::Free,
+            rotation: MotionConstraint::Free,
+        }
+    }
+    /// Replaces the position of the centroid [m].
+    pub fn with_position(mut self, position: DVec3) -> Grain {
+        self.pose.position = position;
+        self
+    }
+    /// Replaces the orientation (body frame to space frame).
+    pub fn with_orientation(mut self, orientation: DQuat) -> Grain {
+        self.pose.orientation = orientation;
+        self
+    }
+    /// Replaces the material.
+    pub fn with_material(mut self, material: Material) -> Grain {
+        self.material = material;
+        self
+    }
+    /// Replaces the initial velocity of the centroid [m/s].
+    pub fn with_velocity(mut self, velocity: DVec3) -> Grain {
+        self.velocity = velocity;
+        self
+    }
+    /// Replaces the initial angular velocity, space frame [rad/s].
+    pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
+        self.angular_velocity = angular_velocity;
+        self
+    }
+    /// Holds the grain still.
+    pub fn held(mut self) -> Grain {
+        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        (self.translation, self.rotation) =
+            (MotionConstraint::Prescribed(DVec3::ZERO), MotionConstraint::Prescribed(DVec3::ZERO));
+        self
+    }
+}
