@@ -43,9 +43,8 @@ pub struct Outside {
 fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
     let mut best: Option<(f64, DVec3)> = None;
     for node in owner.shape.nodes() {
-        let least = best.map_or(f64::INFINITY, |(least, _)| least);
-        let distance = field.distance_within(node.position, least);
-        if distance < least {
+        let distance = field.distance_within(node.position, f64::INFINITY);
+        if best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, node.position));
         }
     }
