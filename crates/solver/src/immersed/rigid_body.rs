@@ -89,8 +89,8 @@ impl RigidBodySystem {
     }
 
     /// Assembles the equations under the `applied` load (weight less buoyancy, and external loads)
-    /// over `dt` [s], without contact. `surface` is the part of the grain beyond a free surface, and
-    /// the load of the pressure at this surface.
+    /// over `dt` [s], without contact. `surface` is the part of the grain beyond a free surface,
+    /// and the load of the pressure at this surface.
     pub fn new(
         grain: &Grain,
         previous: &PreviousStep,

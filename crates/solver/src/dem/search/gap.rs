@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DVec3, IVec3};
 
+use super::deepest_point::{DescentLimits, minimise_distance};
 use super::shifts;
-use super::surface::{DescentLimits, PartnerField, SurfacePoint, minimise_distance};
+use super::surface::{PartnerField, SurfacePoint};
 use crate::dem::enclosure::{Enclosure, Partner, WallFace};
 use crate::dem::grain::Grain;
 
@@ -50,8 +51,12 @@ fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
     }
     let radius = owner.shape.bounding_radius();
     let start = SurfacePoint::at(field, best?.1)?;
-    let limits =
-        DescentLimits { stride: radius, tolerance: TOLERANCE * radius, iterations: ITERATIONS };
+    let limits = DescentLimits {
+        stride: radius,
+        tolerance: TOLERANCE * radius,
+        iterations: ITERATIONS,
+        rejections: ITERATIONS,
+    };
     Some(minimise_distance(&owner.shape, field, start, limits))
 }
 

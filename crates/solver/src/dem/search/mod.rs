@@ -5,6 +5,7 @@
 //! (`narrow_phase.rs`): surface nodes of each grain in the distance field of its partner, and the
 //! deepest point of the surface.
 
+mod deepest_point;
 mod gap;
 mod narrow_phase;
 mod node_scan;
@@ -12,8 +13,9 @@ mod node_tree;
 mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
-pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint, PosedShape};
+pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint};
 pub(super) use node_tree::NodeTree;
+pub(super) use surface::PosedShape;
 
 use glam::{DVec3, IVec3};
 

@@ -1,15 +1,13 @@
 //! Narrow phase: contact patch of a pair, from the surface nodes of each grain in the distance
 //! field of its partner and the deepest point of the surface (Eqs 7-8).
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use grainwake_shape::Shape;
 
-use super::node_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_nodes};
-use super::node_tree::NodeTree;
-use super::surface::{
-    DescentLimits, GRADIENT_MARGIN, PartnerField, SurfacePoint, minimise_distance,
-    project_to_surface,
+use super::node_scan::{
+    PenetratingPoint, SurfaceMemory, follow_contact, scan_candidates, scan_nodes,
 };
+use super::surface::{PartnerField, PosedShape, SurfacePoint, project_to_surface};
 
 /// Penetrating point of a pair, space frame.
 #[derive(Clone, Copy, Debug)]
@@ -59,9 +57,7 @@ impl ContactPatch {
     /// Records that the surfaces may have approached each other by `displacement` [m].
     pub fn approach(&mut self, displacement: f64) {
         self.separation -= displacement;
-        for memory in &mut self.memory {
-            memory.slack -= GRADIENT_MARGIN * displacement;
-        }
+        self.memory.iter_mut().for_each(|memory| memory.approach(displacement));
     }
 
     /// Finds the penetrating points of two grains (Eqs 7-8); returns the closest point if the
@@ -168,8 +164,6 @@ const DEEPEST_POINT: u32 = SECOND_GRAIN - 1;
 /// Area of the deepest point [node areas]. The deepest point carries the contact before the first
 /// node penetrates, and counts little in a patch of many nodes.
 const DEEPEST_POINT_AREA: f64 = 1.0;
-/// Most steps in the search of the deepest point.
-const ITERATIONS: usize = 10;
 /// A mirror point is used if the surface lies within this fraction of its distance from the deepest
 /// point.
 const MIRROR_TOLERANCE: f64 = 0.3;
@@ -180,25 +174,12 @@ const SEARCH_RANGE: f64 = 3.0;
 /// Largest distance of a surface point from the nearest node [node spacings].
 const NODE_COVERAGE: f64 = 1.2;
 
-/// Shape of a grain, or of a periodic image, at its pose.
-#[derive(Clone, Copy)]
-pub(in crate::dem) struct PosedShape<'a> {
-    /// Shape.
-    pub shape: &'a Shape,
-    /// Hierarchy of its surface nodes.
-    pub tree: &'a NodeTree,
-    /// Rotation from the principal frame to the space frame.
-    pub rotation: DMat3,
-    /// Centroid [m].
-    pub position: DVec3,
-}
-
 /// Tests the nodes of `owner` in the field of its partner (Eq. 7). Penetrating points go to `found`
 /// in ascending identifier.
 ///
 /// Returns a lower bound of the distance between surface and partner [m], and the closest point of
-/// the surface if it may be nearer than `reach` [m]. `memory`, filled by the last search in the
-/// same step, only saves work.
+/// the surface if it may be nearer than `reach` [m]. `memory` is that of the last search in the
+/// same step.
 fn scan_surface(
     owner: &PosedShape,
     partner: &PartnerField,
@@ -207,6 +188,10 @@ fn scan_surface(
     found: &mut Vec<PenetratingPoint>,
 ) -> (f64, Option<SurfacePoint>) {
     let tree = owner.tree;
+    if let Some(deepest) = follow_contact(tree, partner, memory, found) {
+        add_deepest_point(owner, partner, deepest, found);
+        return (f64::NEG_INFINITY, Some(deepest));
+    }
     let range = NODE_COVERAGE * tree.spacing + reach;
     let nearest = scan_candidates(tree, partner, memory, found)
         .unwrap_or_else(|| scan_nodes(tree, partner, SEARCH_RANGE * range, memory, found));
@@ -219,23 +204,27 @@ fn scan_surface(
     let Some(start) = start else {
         return (separation, None);
     };
-    let limits = DescentLimits {
-        stride: tree.spacing,
-        tolerance: 1e-5 * tree.spacing,
-        iterations: ITERATIONS,
-    };
-    let closest = minimise_distance(owner.shape, partner, start, limits);
-    if closest.distance < 0.0 {
-        if found.len() <= RESOLVED {
-            add_mirror_points(owner.shape, partner, closest.position, found);
-        }
-        found.push(PenetratingPoint {
-            id: DEEPEST_POINT,
-            area: DEEPEST_POINT_AREA * tree.spacing * tree.spacing,
-            point: closest,
-        });
+    let deepest = memory.minima.find(owner, partner, start, &memory.candidates);
+    add_deepest_point(owner, partner, deepest, found);
+    (separation, Some(deepest))
+}
+
+/// Adds the deepest point to the penetrating nodes, if it penetrates, and mirror points to a patch
+/// of few nodes.
+fn add_deepest_point(
+    owner: &PosedShape,
+    partner: &PartnerField,
+    deepest: SurfacePoint,
+    found: &mut Vec<PenetratingPoint>,
+) {
+    if deepest.distance >= 0.0 {
+        return;
     }
-    (separation, Some(closest))
+    if found.len() <= RESOLVED {
+        add_mirror_points(owner.shape, partner, deepest.position, found);
+    }
+    let area = DEEPEST_POINT_AREA * owner.tree.spacing * owner.tree.spacing;
+    found.push(PenetratingPoint { id: DEEPEST_POINT, area, point: deepest });
 }
 
 /// Shares the area of each node with its mirror image about the deepest point, if the image lies on

@@ -1,8 +1,9 @@
 //! Nodes of one grain that penetrate its partner, and the nearest node: by the hierarchy of the
 //! nodes, or within a step by the candidates of the last search.
 
+use super::deepest_point::{DEPTH_BELOW_NODES, LocalMinima};
 use super::node_tree::NodeTree;
-use super::surface::{PartnerField, SurfacePoint};
+use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint};
 
 /// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
 const CANDIDATE_RANGE: f64 = 0.5;
@@ -22,13 +23,18 @@ pub(super) struct PenetratingPoint {
 /// starts.
 #[derive(Debug, Default)]
 pub(super) struct SurfaceMemory {
-    /// Nodes within the candidate range at the last traversal, in ascending order.
-    candidates: Vec<u32>,
+    /// Nodes within the candidate range at the last traversal, in ascending order: distance [m] in
+    /// the last test of all of them, and index.
+    pub candidates: Vec<(f64, u32)>,
+    /// Distance by which the surfaces may have approached since then [m].
+    approach: f64,
     /// Distance by which the surfaces may approach until other nodes than the candidates may
     /// penetrate [m].
-    pub slack: f64,
+    slack: f64,
     /// Nearest node.
     pub nearest: Option<u32>,
+    /// Local minima of the distance.
+    pub minima: LocalMinima,
 }
 
 impl SurfaceMemory {
@@ -36,6 +42,14 @@ impl SurfaceMemory {
     pub fn reset(&mut self) {
         self.candidates.clear();
         (self.slack, self.nearest) = (0.0, None);
+        self.minima.reset();
+    }
+
+    /// Records that the surfaces may have approached each other by `displacement` [m].
+    pub fn approach(&mut self, displacement: f64) {
+        self.slack -= GRADIENT_MARGIN * displacement;
+        self.approach += GRADIENT_MARGIN * displacement;
+        self.minima.approach(displacement);
     }
 }
 
@@ -61,7 +75,7 @@ impl NearestNode {
 pub(super) fn scan_candidates(
     tree: &NodeTree,
     partner: &PartnerField,
-    memory: &SurfaceMemory,
+    memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
 ) -> Option<NearestNode> {
     if memory.slack <= 0.0 {
@@ -69,10 +83,33 @@ pub(super) fn scan_candidates(
     }
     found.clear();
     let mut nearest = NearestNode { distance: memory.slack, index: None };
-    for &index in &memory.candidates {
-        test_node(tree, partner, index, f64::INFINITY, &mut nearest, found);
+    for (distance, index) in &mut memory.candidates {
+        *distance = test_node(tree, partner, *index, f64::INFINITY, &mut nearest, found);
     }
-    nearest.index.is_some().then_some(nearest)
+    memory.approach = 0.0;
+    // The nodes below which the deepest point may lie must be candidates.
+    let depth = DEPTH_BELOW_NODES * tree.spacing;
+    let is_complete = nearest.distance >= depth || nearest.distance + depth <= memory.slack;
+    (nearest.index.is_some() && is_complete).then_some(nearest)
+}
+
+/// Collects the penetrating nodes and returns the deepest point, from the last search in the same
+/// step; `None` if another node may penetrate or another point may be the deepest.
+pub(super) fn follow_contact(
+    tree: &NodeTree,
+    partner: &PartnerField,
+    memory: &SurfaceMemory,
+    found: &mut Vec<PenetratingPoint>,
+) -> Option<SurfacePoint> {
+    let deepest = memory.minima.deepest_known(partner).filter(|_| memory.slack > 0.0)?;
+    found.clear();
+    let mut nearest = NearestNode { distance: f64::INFINITY, index: None };
+    for &(distance, index) in &memory.candidates {
+        if distance < memory.approach {
+            test_node(tree, partner, index, f64::INFINITY, &mut nearest, found);
+        }
+    }
+    Some(deepest)
 }
 
 /// Tests a node; returns its distance, or infinity if it exceeds `reach` [m].
@@ -105,8 +142,9 @@ pub(super) fn scan_nodes(
     found: &mut Vec<PenetratingPoint>,
 ) -> NearestNode {
     found.clear();
-    let SurfaceMemory { candidates, slack, nearest: seed, .. } = memory;
+    let SurfaceMemory { candidates, approach, slack, nearest: seed, .. } = memory;
     candidates.clear();
+    *approach = 0.0;
     *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
@@ -122,8 +160,9 @@ pub(super) fn scan_nodes(
         if cluster.is_leaf(cluster_index) {
             for index in cluster.nodes.0..cluster.nodes.1 {
                 let reach = nearest.distance.max(*slack);
-                if test_node(tree, partner, index, reach, &mut nearest, found) <= *slack {
-                    candidates.push(index);
+                let distance = test_node(tree, partner, index, reach, &mut nearest, found);
+                if distance <= *slack {
+                    candidates.push((distance, index));
                 }
             }
         }
