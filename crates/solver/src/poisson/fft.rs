@@ -75,25 +75,40 @@ fn step<V: Vector, const R: usize>(
     Short: Butterfly<R>,
 {
     let (stride, span) = (pass.stride, pass.blocks * pass.stride);
-    for (p, block) in target[..R * span].chunks_exact_mut(R * stride).enumerate() {
-        let mut from: [&[Complex<V>]; R] = [&[]; R];
-        for t in 0..R {
-            from[t] = &source[t * span + p * stride..][..stride];
-        }
-        let to: [_; R] = cut(block, stride);
-        if pass.blocks == 1 {
-            // All twiddle factors of the last pass are one.
-            for q in 0..stride {
-                let y = butterfly(&from, q);
-                for t in 0..R {
-                    to[t][q] = y[t];
-                }
-            }
-            return;
-        }
-        let turn = &pass.turn[p * (R - 1)..][..R - 1];
-        for q in 0..stride {
+    let mut from: [&[Complex<V>]; R] = [&[]; R];
+    for t in 0..R {
+        from[t] = &source[t * span..][..span];
+    }
+    let target = &mut target[..R * span];
+    if pass.blocks == 1 {
+        // All twiddle factors of the last pass are one.
+        let to: [_; R] = cut(target, span);
+        for q in 0..span {
             let y = butterfly(&from, q);
+            for t in 0..R {
+                to[t][q] = y[t];
+            }
+        }
+        return;
+    }
+    let turns = pass.turn.chunks_exact(R - 1);
+    if stride == 1 {
+        // The first pass is as long as any other; slices of one entry would double its cost.
+        let (to, _) = target.as_chunks_mut::<R>();
+        for ((p, turn), to) in turns.enumerate().zip(to) {
+            let y = butterfly(&from, p);
+            to[0] = y[0];
+            for t in 1..R {
+                to[t] = y[t].times(turn[t - 1]);
+            }
+        }
+        return;
+    }
+    for ((p, turn), block) in turns.enumerate().zip(target.chunks_exact_mut(R * stride)) {
+        let here = from.map(|from| &from[p * stride..][..stride]);
+        let to: [_; R] = cut(block, stride);
+        for q in 0..stride {
+            let y = butterfly(&here, q);
             to[0][q] = y[0];
             for t in 1..R {
                 to[t][q] = y[t].times(turn[t - 1]);
