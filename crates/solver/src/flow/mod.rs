@@ -57,7 +57,6 @@ impl FluidParams {
 pub struct Flow<R = f64> {
     /// Grid of the box.
     mesh: Mesh,
-    /// Planes whose fields this flow holds, the whole box.
     /// Conditions on the faces of the box.
     boundaries: Boundaries,
     /// Constants of the tendency.
@@ -115,6 +114,7 @@ impl<R: Real> Flow<R> {
             crossing_speeds: [[0.0; 2]; 3],
         };
         flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
+        flow.poisson.non_temporal = flow.non_temporal;
         flow.velocity.fill(params.initial_velocity);
         flow.make_solenoidal();
         flow

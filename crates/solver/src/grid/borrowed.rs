@@ -8,7 +8,7 @@ use std::ops::Range;
 pub struct BorrowedRow {
     /// Addresses in memory.
     pub addresses: Range<usize>,
-    /// Whether the row may be written.
+    /// True if the row may be written.
     pub mutable: bool,
 }
 

@@ -9,7 +9,7 @@
 
 use super::fft::Fft;
 use crate::math::Real;
-use grainwake_simd::{Complex, Vector};
+use grainwake_simd::{Complex, Kernel, Vector, as_complex, dispatch};
 
 /// Transforms of one axis and the eigenvalues of minus the second difference.
 pub struct AxisTransform<R> {
@@ -29,27 +29,6 @@ pub struct AxisTransform<R> {
 }
 
 impl<R: Real> AxisTransform<R> {
-    /// Transforms pairs of lines in `a`, using both buffers; returns the one with the result.
-    ///
-    /// Forward: cell i at `order[i]` -> modes. Inverse: modes -> cell i at `order[i]`, with real
-    /// and imaginary parts exchanged, unnormalised.
-    #[inline(always)]
-    pub fn run<'a, V: Vector<Number = R>>(
-        &self,
-        a: &'a mut [Complex<V>],
-        b: &'a mut [Complex<V>],
-        inverse: bool,
-    ) -> &'a [Complex<V>] {
-        if inverse {
-            self.join(&mut a[..self.n]);
-        }
-        let [found, _] = self.fourier.run(a, b);
-        if !inverse {
-            self.split(&mut found[..self.n]);
-        }
-        &found[..self.n]
-    }
-
     /// Turns spectra of pairs of lines into modes: real parts belong to the first lines, imaginary
     /// parts to the second lines.
     #[inline(always)]
@@ -84,6 +63,67 @@ impl<R: Real> AxisTransform<R> {
             modes[self.n / 2] = modes[self.n / 2].scale(self.middle[1]).swap_parts();
         }
     }
+}
+
+/// Transform of pairs of lines. It is a kernel of its own, so that its loops are compiled once per
+/// instruction set and not once per direction.
+struct TransformLines<'a, R> {
+    axis: &'a AxisTransform<R>,
+    /// Both buffers, one after the other; the first holds the lines.
+    buffers: &'a mut [R],
+    /// Whether modes are transformed to cells.
+    inverse: bool,
+    /// Whether the lines have half the lanes of the widest register.
+    half: bool,
+    /// Set to whether the second buffer holds the result.
+    second: &'a mut bool,
+}
+
+impl<R: Real> Kernel for TransformLines<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(self) {
+        if self.half {
+            self.transform::<V::Half>();
+        } else {
+            self.transform::<V>();
+        }
+    }
+}
+
+impl<R: Real> TransformLines<'_, R> {
+    #[inline(always)]
+    fn transform<V: Vector<Number = R>>(self) {
+        let axis = self.axis;
+        let (a, b) = as_complex::<V>(self.buffers).split_at_mut(axis.fourier.buffer_len());
+        let first = a.as_ptr();
+        if self.inverse {
+            axis.join(&mut a[..axis.n]);
+        }
+        let [found, _] = axis.fourier.run(a, b);
+        if !self.inverse {
+            axis.split(&mut found[..axis.n]);
+        }
+        *self.second = first != found.as_ptr();
+    }
+}
+
+/// Transforms the pairs of lines in the first of two `buffers`, one after the other; returns the
+/// result.
+///
+/// Forward: cell i at `order[i]` -> modes. Inverse: modes -> cell i at `order[i]`, with real and
+/// imaginary parts exchanged, unnormalised.
+#[inline(always)]
+pub fn transform_lines<'a, V: Vector<Number: Real>>(
+    axis: &AxisTransform<V::Number>,
+    buffers: &'a mut [V::Number],
+    inverse: bool,
+) -> &'a [Complex<V>] {
+    let mut second = false;
+    let half = 2 * V::WIDTH == V::Number::LANES;
+    dispatch(TransformLines { axis, buffers: &mut *buffers, inverse, half, second: &mut second });
+    let start = if second { axis.fourier.buffer_len() } else { 0 };
+    &as_complex::<V>(buffers)[start..][..axis.n]
 }
 
 /// Modes k = 1, 2... below n/2, each with its mirror n - k.

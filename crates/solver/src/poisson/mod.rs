@@ -69,6 +69,8 @@ pub struct Poisson<R = f64> {
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
     times: PoissonTimes,
+    /// Whether the modes are written with non-temporal stores.
+    pub non_temporal: bool,
 }
 
 /// Scratch of one range of planes.
@@ -92,6 +94,7 @@ impl<R: Real> Poisson<R> {
     ) {
         let (axes, stride, nz) = (&self.axes, self.layout.stride(), self.mesh.cells[2]);
         let range = nz.div_ceil(self.slots.len());
+        let non_temporal = self.non_temporal;
 
         let start = Stopwatch::start();
         let ranges = self.modes.par_chunks_mut(range * stride).enumerate();
@@ -99,7 +102,7 @@ impl<R: Real> Poisson<R> {
             let Slot { planes: [plane, ..], buffers } = slot;
             for (k, modes) in (1 + n * range..).zip(modes.chunks_exact_mut(stride)) {
                 source(k, plane);
-                plane.forward(axes, modes, buffers);
+                plane.forward(axes, modes, non_temporal, buffers);
             }
         });
 

@@ -55,6 +55,7 @@ impl<R: Real> Poisson<R> {
                 .collect(),
             axes,
             times: PoissonTimes::default(),
+            non_temporal: false,
         }
     }
 

@@ -8,7 +8,9 @@
 //!
 //! Legend: L count of numbers in a cache line.
 
-use super::axis::AxisTransform;
+use std::marker::PhantomData;
+
+use super::axis::{AxisTransform, transform_lines};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Complex, Kernel, MAX_LANES, Vector, as_complex, dispatch};
 
@@ -67,11 +69,13 @@ impl<R: Real> Plane<R> {
         &mut self.values[j * self.layout.pitch + R::LANES - 1..][..self.layout.nx + 2]
     }
 
-    /// Transforms the cells to `modes`; the cells are overwritten.
+    /// Transforms the cells to `modes`, which are written with non-temporal stores if
+    /// `non_temporal`; the cells are overwritten.
     pub(super) fn forward(
         &mut self,
         [along_x, along_y]: &[AxisTransform<R>; 2],
         modes: &mut [R],
+        non_temporal: bool,
         buffers: &mut Aligned<R>,
     ) {
         let PlaneLayout { nx, ny, pitch, .. } = self.layout;
@@ -81,7 +85,11 @@ impl<R: Real> Plane<R> {
             self.transform(along_y, block, Direction::ForwardY, buffers);
         }
         for block in self.layout.blocks(ny) {
-            self.transform(along_x, block, Direction::ForwardX(modes), buffers);
+            let direction = Direction::ForwardX { modes, non_temporal };
+            self.transform(along_x, block, direction, buffers);
+        }
+        if non_temporal {
+            dispatch(Fence(PhantomData::<R>));
         }
     }
 
@@ -138,11 +146,22 @@ enum Direction<'a, R> {
     /// Cells to modes along y, in place.
     ForwardY,
     /// Rows of modes along y to modes along both axes.
-    ForwardX(&'a mut [R]),
+    ForwardX { modes: &'a mut [R], non_temporal: bool },
     /// Modes along both axes to rows of modes along y.
     InverseX(&'a [R]),
     /// Modes along y to cells, in place.
     InverseY,
+}
+
+/// Orders the non-temporal stores of a plane before all later stores.
+struct Fence<R>(PhantomData<R>);
+
+impl<R: Real> Kernel for Fence<R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(self) {
+        V::fence();
+    }
 }
 
 /// Transform of one block of lines.
@@ -178,26 +197,31 @@ impl<R: Real> TransformBlock<'_, R> {
         let TransformBlock { axis, layout, first, second, .. } = self;
         let PlaneLayout { nx, line, pitch, .. } = layout;
         let len = axis.fourier.buffer_len();
-        let (a, b) = as_complex::<V>(&mut self.buffers[..4 * V::WIDTH * len]).split_at_mut(len);
+        let buffers = &mut self.buffers[..4 * V::WIDTH * len];
         for lane in (0..second).step_by(V::WIDTH) {
             let cells = Lines { at: pitch + line + first + lane, step: pitch, second };
             let rows = Rows { at: (first + 1 + lane) * pitch + line, pitch, second };
             let modes = Lines { at: first * nx + lane, step: 2 * second, second };
+            let a = as_complex::<V>(buffers);
             match &self.direction {
                 Direction::ForwardY => {
                     for (i, &to) in axis.order.iter().enumerate() {
                         a[to] = cells.entry(self.values, i);
                     }
                 }
-                Direction::ForwardX(_) => rows.load(&axis.order, self.values, a),
+                Direction::ForwardX { .. } => rows.load(&axis.order, self.values, a),
                 Direction::InverseX(from) => modes.load(from, &mut a[..axis.n]),
                 Direction::InverseY => cells.load(self.values, &mut a[..axis.n]),
             }
             let inverse = matches!(self.direction, Direction::InverseX(_) | Direction::InverseY);
-            let found = axis.run(a, b, inverse);
+            let found = transform_lines::<V>(axis, buffers, inverse);
             match &mut self.direction {
                 Direction::ForwardY => cells.store(found, self.values),
-                Direction::ForwardX(to) => modes.store(found, to),
+                // A narrower register would write part of a cache line.
+                Direction::ForwardX { modes: to, non_temporal: true } if V::WIDTH == R::LANES => {
+                    modes.store_non_temporal(found, to);
+                }
+                Direction::ForwardX { modes: to, .. } => modes.store(found, to),
                 Direction::InverseX(_) => rows.store(&axis.order, found, self.values),
                 Direction::InverseY => {
                     for (i, &from) in axis.order.iter().enumerate() {
@@ -243,6 +267,15 @@ impl Lines {
     fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
         for (i, x) in a.iter().enumerate() {
             self.set_entry(values, i, *x);
+        }
+    }
+    /// Stores all entries of the lines with non-temporal stores.
+    #[inline(always)]
+    fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+        for (i, x) in a.iter().enumerate() {
+            let both = &mut values[self.at + i * self.step..][..self.second + V::WIDTH];
+            x.re.store_non_temporal(both);
+            x.im.store_non_temporal(&mut both[self.second..]);
         }
     }
 }

@@ -2,28 +2,28 @@
 //! the partner.
 //!
 //! On a rough surface the distance has several local minima, and a contact is often shallower than
-//! the differences between them. A search that ends in a random one of them makes the overlap jump,
-//! and every jump changes the energy of the spring. The search therefore starts from every node
-//! below which the deepest point may lie (`docs/decisions/0024-deepest-point.md`). Within a step
-//! its minima serve until the surfaces have moved by a fraction of the overlap.
+//! the differences between them. A search that ends in any one of them makes the overlap jump, and
+//! every jump changes the energy of the spring. The search therefore starts from every node below
+//! which the deepest point may lie (`docs/decisions/0024-deepest-point.md`). Within a step its
+//! minima are used again until the surfaces have moved by a fraction of the overlap.
 
 use glam::DVec3;
 use grainwake_shape::{Field, Shape};
 
 use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint, project_to_surface};
 
-/// Depth of the surface below its nodes up to which the search looks [node spacings]. Twice as much
-/// misses fewer minima and doubles the time of a falling heap.
+/// Largest depth of the surface below its nodes that the search assumes [node spacings]. Twice the
+/// value finds more of the minima and doubles the time of a falling heap.
 pub(super) const DEPTH_BELOW_NODES: f64 = 0.1;
 /// Least distance between the nodes from which descents start [node spacings].
 const START_DISTANCE: f64 = 1.0;
-/// Minima that are less deep than the deepest by at most this are kept [node spacings].
+/// Largest difference in depth between the deepest minimum and one that is kept [node spacings].
 const KEPT_DEPTH: f64 = 0.05;
 /// Distance below which two minima count as one [node spacings].
 const SAME_MINIMUM: f64 = 0.1;
-/// Distance by which surfaces move until the next search [node spacings], at least.
+/// Least distance by which the surfaces move before the next search [node spacings].
 const LEAST_SLACK: f64 = 0.002;
-/// Distance by which surfaces move until the next search, as a fraction of overlap or gap.
+/// Distance by which the surfaces move before the next search, over the overlap or the gap.
 const RELATIVE_SLACK: f64 = 0.05;
 /// First and last radius of the compass search [node spacings].
 const COMPASS_RADII: [f64; 2] = [0.5, 0.05];
@@ -58,8 +58,8 @@ impl LocalMinima {
     }
 
     /// Finds the point of the surface of `owner` with the smallest distance. `nearest` is the
-    /// nearest node; `near` has the distances [m] and indices of all nodes that are farther away by
-    /// less than [`DEPTH_BELOW_NODES`].
+    /// nearest node; `near` has the distances [m] and indices of at least all nodes that are
+    /// farther away by less than [`DEPTH_BELOW_NODES`].
     pub fn find(
         &mut self,
         owner: &PosedShape,
@@ -72,25 +72,6 @@ impl LocalMinima {
             let limits = limits.scaled(owner.tree.spacing);
             return steepest_descent(owner.shape, partner, nearest, limits).0;
         }
-        self.search(owner, partner, nearest, near)
-    }
-
-    /// Deepest of the known minima; `None` if another point may be deeper.
-    pub fn deepest_known(&self, partner: &PartnerField) -> Option<SurfacePoint> {
-        if self.slack <= 0.0 {
-            return None;
-        }
-        let minima = self.positions.iter().filter_map(|x| SurfacePoint::at(partner, *x));
-        minima.min_by(|a, b| a.distance.total_cmp(&b.distance))
-    }
-
-    fn search(
-        &mut self,
-        owner: &PosedShape,
-        partner: &PartnerField,
-        nearest: SurfacePoint,
-        near: &[(f64, u32)],
-    ) -> SurfacePoint {
         let spacing = owner.tree.spacing;
         let mut deepest = self.descend_from_nodes(owner, partner, nearest, near);
         let slack = |deepest: &SurfacePoint| {
@@ -116,6 +97,15 @@ impl LocalMinima {
         }
         self.slack = slack(&deepest);
         deepest
+    }
+
+    /// Deepest of the known minima; `None` if another point may be deeper.
+    pub fn deepest_known(&self, partner: &PartnerField) -> Option<SurfacePoint> {
+        if self.slack <= 0.0 {
+            return None;
+        }
+        let minima = self.positions.iter().filter_map(|x| SurfacePoint::at(partner, *x));
+        minima.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
 
     /// Descends from the nodes below which the deepest point may lie; returns the deepest result.
@@ -163,7 +153,8 @@ impl LocalMinima {
     }
 }
 
-/// Whether the distance has one minimum on the surface: spheres among each other and at walls.
+/// Returns true for a sphere whose partner is a sphere or a wall: the distance then has a single
+/// minimum on its surface.
 fn has_one_minimum(surface: &Shape, partner: &PartnerField) -> bool {
     let is_sphere = |shape: &Shape| matches!(shape.field(), Field::Sphere(_));
     is_sphere(surface)

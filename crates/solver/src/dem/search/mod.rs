@@ -45,7 +45,7 @@ struct ImageCentre {
     grain: u32,
     /// Periods from the grain's own position to this centre.
     image: IVec3,
-    /// Whether this is the image inside the box.
+    /// True for the image inside the box.
     inside: bool,
 }
 

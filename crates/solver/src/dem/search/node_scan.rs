@@ -84,7 +84,8 @@ pub(super) fn scan_candidates(
     found.clear();
     let mut nearest = NearestNode { distance: memory.slack, index: None };
     for (distance, index) in &mut memory.candidates {
-        *distance = test_node(tree, partner, *index, f64::INFINITY, &mut nearest, found);
+        *distance = test_node(tree, partner, *index, f64::INFINITY, found);
+        nearest.update(*distance, *index);
     }
     memory.approach = 0.0;
     // The nodes below which the deepest point may lie must be candidates.
@@ -103,27 +104,24 @@ pub(super) fn follow_contact(
 ) -> Option<SurfacePoint> {
     let deepest = memory.minima.deepest_known(partner).filter(|_| memory.slack > 0.0)?;
     found.clear();
-    let mut nearest = NearestNode { distance: f64::INFINITY, index: None };
     for &(distance, index) in &memory.candidates {
         if distance < memory.approach {
-            test_node(tree, partner, index, f64::INFINITY, &mut nearest, found);
+            test_node(tree, partner, index, f64::INFINITY, found);
         }
     }
     Some(deepest)
 }
 
-/// Tests a node; returns its distance, or infinity if it exceeds `reach` [m].
+/// Collects a node if it penetrates; returns its distance, or infinity beyond `reach` [m].
 fn test_node(
     tree: &NodeTree,
     partner: &PartnerField,
     index: u32,
     reach: f64,
-    nearest: &mut NearestNode,
     found: &mut Vec<PenetratingPoint>,
 ) -> f64 {
     let node = &tree.nodes[index as usize];
     let distance = partner.distance_within(node.position, reach);
-    nearest.update(distance, index);
     if distance < 0.0
         && let Some(point) = SurfacePoint::at(partner, node.position)
     {
@@ -160,7 +158,8 @@ pub(super) fn scan_nodes(
         if cluster.is_leaf(cluster_index) {
             for index in cluster.nodes.0..cluster.nodes.1 {
                 let reach = nearest.distance.max(*slack);
-                let distance = test_node(tree, partner, index, reach, &mut nearest, found);
+                let distance = test_node(tree, partner, index, reach, found);
+                nearest.update(distance, index);
                 if distance <= *slack {
                     candidates.push((distance, index));
                 }

@@ -20,7 +20,7 @@ pub(in crate::dem) struct NodeCluster {
 }
 
 impl NodeCluster {
-    /// Whether this cluster, at `index`, has no sub-clusters.
+    /// Returns true if this cluster, at `index`, has no sub-clusters.
     pub fn is_leaf(&self, index: usize) -> bool {
         self.skip as usize == index + 1
     }
