@@ -6,7 +6,8 @@
 # memcheck  valgrind on the release program with two small cases in both precisions, 2 threads
 # address   address sanitizer on the tests of crates/simd, with all instruction sets of the machine
 # thread    thread sanitizer on grains that share rows of faces: unit tests of the coupling, and the
-#           test `sharing` of crates/solver with up to 4 threads
+#           test `sharing` of crates/solver with up to 4 threads; then on a test that races on
+#           purpose, which must be reported
 # miri      tests of crates/simd with the instructions of every machine, and tests of the shared rows
 #           of fields
 # step      a step of two touching grains on 2 threads under Miri; more than 6 min of CPU time
@@ -49,8 +50,21 @@ thread() {
   local library
   library="$(rustc +nightly --print sysroot 2>/dev/null)/lib/rustlib/src/rust/library"
   [ -d "$library" ] || { missing thread "no nightly with rust-src"; return; }
-  RUSTFLAGS="-Zsanitizer=thread" cargo +nightly test -Zbuild-std --release --target "$host" \
-    --target-dir target/thread -p grainwake-solver --lib --test sharing -- immersed sharing
+  thread_tests() { # ARGUMENTS
+    RUSTFLAGS="-Zsanitizer=thread" cargo +nightly test -Zbuild-std --release --target "$host" \
+      --target-dir target/thread -p grainwake-solver --lib --test sharing -- "$@"
+  }
+  thread_tests immersed sharing
+  # The check can fail: a test that races on purpose must be reported.
+  local log
+  log="$(mktemp)"
+  if thread_tests --ignored at_once_race >"$log" 2>&1 || ! grep -q "data race" "$log"; then
+    tail -n 20 "$log" >&2
+    echo "thread: the race of a test that races on purpose was not reported" >&2
+    exit 1
+  fi
+  rm "$log"
+  echo "thread: no race, and the race on purpose was reported"
 }
 
 miri_solver() { # ARGUMENTS

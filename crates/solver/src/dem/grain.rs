@@ -80,3 +80,24 @@ impl Grain {
         self.velocity + self.angular_velocity.cross(x - self.pose.position)
     }
 }
+
+/// Position at the last time level, and velocities that the grain has during the step: a prescribed
+/// velocity is set before the flow is predicted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GrainKinematics {
+    /// Centroid [m].
+    pub position: DVec3,
+    /// Velocities during the step.
+    pub velocity: RigidVelocity,
+}
+
+impl GrainKinematics {
+    /// Present kinematics of a grain.
+    pub fn of(grain: &Grain) -> GrainKinematics {
+        GrainKinematics { position: grain.pose.position, velocity: grain.rigid_velocity() }
+    }
+    /// Velocity [m/s] of the grain's material point at `x` [m].
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.velocity.at(x - self.position)
+    }
+}

@@ -22,6 +22,7 @@ mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner};
+pub(crate) use grain::GrainKinematics;
 pub use grain::{Grain, MotionConstraint};
 pub use material::Material;
 pub use motion::{

@@ -30,36 +30,15 @@
 
 use std::ops::Range;
 
-use glam::{DVec3, IVec3};
-
 use super::geometry::{FaceRow, LocatedBody};
-use super::links::{BoxVelocity, LinkPlanes, NO_LINK, compute_link_weights, listed_faces};
-use crate::dem::Grain;
+use super::links::{
+    BoxVelocity, LinkPlanes, NO_LINK, RigidLinks, compute_link_weights, listed_faces,
+};
+use crate::dem::GrainKinematics;
 use crate::flow::{OldState, Prediction};
-use crate::grid::{FACE_OFFSET, Mesh};
-use crate::math::{Real, RigidVelocity};
+use crate::grid::Mesh;
+use crate::math::Real;
 use grainwake_simd::{Kernel, Stencil, Vector, dispatch};
-
-/// Position at the last time level, and velocities that the grain has during the step: a prescribed
-/// velocity is set before the flow is predicted.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GrainKinematics {
-    /// Centroid [m].
-    pub position: DVec3,
-    /// Velocities during the step.
-    pub velocity: RigidVelocity,
-}
-
-impl GrainKinematics {
-    /// Present kinematics of a grain.
-    pub fn of(grain: &Grain) -> GrainKinematics {
-        GrainKinematics { position: grain.pose.position, velocity: grain.rigid_velocity() }
-    }
-    /// Velocity [m/s] of the grain's material point at `x` [m].
-    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
-        self.velocity.at(x - self.position)
-    }
-}
 
 /// Largest Reynolds number |(1/A - 1) (c - U_c)| h / nu of the first term.
 pub const LARGEST_EXCESS: f64 = 100.0;
@@ -166,45 +145,6 @@ pub struct ComponentLinks<'a, R> {
     unknowns: [Range<i32>; 3],
     axes: [LinkAxis; 3],
     rigid: RigidLinks,
-}
-
-/// Rigid velocity at the middles of the links of one component. It is linear in the indices
-/// (i, j, k) of the lower face of a link.
-struct RigidLinks {
-    /// U_q and U_c [m/s] of link (0, 0, 0) along each axis.
-    first: [[f64; 2]; 3],
-    /// Changes of U_q and U_c from a link to the next along x, y and z.
-    change: [[[f64; 2]; 3]; 3],
-}
-
-impl RigidLinks {
-    fn new(
-        mesh: &Mesh,
-        kinematics: &GrainKinematics,
-        lowest: IVec3,
-        component: usize,
-    ) -> RigidLinks {
-        let omega = kinematics.velocity.angular;
-        let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
-        let face = lowest.as_dvec3() + (DVec3::from_array(FACE_OFFSET[component]) - 1.0);
-        let first = [0, 1, 2].map(|along| {
-            let middle = face + 0.5 * DVec3::AXES[along];
-            let velocity = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
-            [component, along].map(|of| velocity[of])
-        });
-        let change = change.map(|u| [0, 1, 2].map(|along| [component, along].map(|of| u[of])));
-        RigidLinks { first, change }
-    }
-
-    /// U_q and U_c [m/s] of the first link of row (j, k) along each axis.
-    #[inline(always)]
-    fn first_of_row(&self, [j, k]: [i32; 2]) -> [[f64; 2]; 3] {
-        let ([y, z], [_, by_y, by_z]) = ([j, k].map(f64::from), &self.change);
-        let sum = |along: usize, of: usize| {
-            self.first[along][of] + y * by_y[along][of] + z * by_z[along][of]
-        };
-        [0, 1, 2].map(|along| [sum(along, 0), sum(along, 1)])
-    }
 }
 
 /// Links along one axis.

@@ -1,5 +1,5 @@
 //! Links next to a grain: their weights, plane by plane, in single precision like the distances,
-//! and the velocity in the box around the grain.
+//! their rigid velocities, and the velocity in the box around the grain.
 //!
 //! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
 //! marks links without correction. `immersed::reference` has the scalar form.
@@ -9,9 +9,13 @@
 
 use std::ops::Range;
 
+use glam::{DVec3, IVec3};
+
 use super::geometry::aperture::{forcing_reach, inverse_aperture_excess};
 use super::geometry::{LocatedBody, PAD};
+use crate::dem::GrainKinematics;
 use crate::flow::OldState;
+use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
@@ -175,6 +179,45 @@ impl ComputeLinkWeights<'_> {
                 d.select_below(outside, w, no_link).store(&mut weight[axis][entry..]);
             }
         }
+    }
+}
+
+/// Rigid velocity at the middles of the links of one component. It is linear in the indices
+/// (i, j, k) of the lower face of a link.
+pub struct RigidLinks {
+    /// U_q and U_c [m/s] of link (0, 0, 0) along each axis.
+    first: [[f64; 2]; 3],
+    /// Changes of U_q and U_c from a link to the next along x, y and z.
+    pub change: [[[f64; 2]; 3]; 3],
+}
+
+impl RigidLinks {
+    pub fn new(
+        mesh: &Mesh,
+        kinematics: &GrainKinematics,
+        lowest: IVec3,
+        component: usize,
+    ) -> RigidLinks {
+        let omega = kinematics.velocity.angular;
+        let change = DVec3::AXES.map(|axis| omega.cross(axis * mesh.spacing));
+        let face = lowest.as_dvec3() + (DVec3::from_array(FACE_OFFSET[component]) - 1.0);
+        let first = [0, 1, 2].map(|along| {
+            let middle = face + 0.5 * DVec3::AXES[along];
+            let velocity = kinematics.velocity_at(mesh.origin + mesh.spacing * middle);
+            [component, along].map(|of| velocity[of])
+        });
+        let change = change.map(|u| [0, 1, 2].map(|along| [component, along].map(|of| u[of])));
+        RigidLinks { first, change }
+    }
+
+    /// U_q and U_c [m/s] of the first link of row (j, k) along each axis.
+    #[inline(always)]
+    pub fn first_of_row(&self, [j, k]: [i32; 2]) -> [[f64; 2]; 3] {
+        let ([y, z], [_, by_y, by_z]) = ([j, k].map(f64::from), &self.change);
+        let sum = |along: usize, of: usize| {
+            self.first[along][of] + y * by_y[along][of] + z * by_z[along][of]
+        };
+        [0, 1, 2].map(|along| [sum(along, 0), sum(along, 1)])
     }
 }
 

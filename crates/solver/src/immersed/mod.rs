@@ -54,7 +54,6 @@ mod schedule;
 mod tests;
 mod update;
 
-pub(crate) use advection::GrainKinematics;
 pub(crate) use open_sides::{Crossing, OpenSides};
 pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidityInput};

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
-use crate::dem::Grain;
+use crate::dem::{Grain, GrainKinematics};
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
@@ -174,10 +174,10 @@ fn padding_of_rows_affects_no_link() {
     assert!(predicted(0.0) == predicted(f64::NAN));
 }
 
-/// Couples two spheres at a gap of `reaches` reaches between their surfaces, one after the other.
+/// Couples two spheres at a gap of `reaches` reaches between their surfaces on `threads` threads.
 /// Returns whether they were isolated, and whether their borrowed rows conflict if they are updated
 /// as isolated grains anyway.
-fn isolated_and_conflicting(scheme: Scheme, reaches: f64) -> (bool, bool) {
+fn isolated_and_conflicting(scheme: Scheme, reaches: f64, threads: usize) -> (bool, bool) {
     let mesh = Mesh { cells: [48, 24, 24], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
     let params = FluidParams {
         density: 1.0,
@@ -207,8 +207,7 @@ fn isolated_and_conflicting(scheme: Scheme, reaches: f64) -> (bool, bool) {
         surface_loads: &[],
         dt: DT,
     };
-    // One thread: the conflict is recorded, and no face is used by two threads.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     // Marked by `find_isolated`, the grains never conflict.
     let isolated = pool.install(|| immersed.couple(&mut flow, input())).isolated();
     assert_eq!(isolated[0], isolated[1], "{reaches}");
@@ -224,10 +223,21 @@ fn isolated_and_conflicting(scheme: Scheme, reaches: f64) -> (bool, bool) {
     (isolated[0], message.is_some())
 }
 
+/// Breaks the rule on which the schedule rests: two threads write the same faces. The thread
+/// sanitizer must report it (`.ci/sanitize.sh thread`).
+#[test]
+#[ignore = "a data race on purpose, for the thread sanitizer"]
+fn touching_grains_that_are_updated_at_once_race() {
+    for _ in 0..20 {
+        isolated_and_conflicting(Scheme::Aperture, 0.1, 2);
+    }
+}
+
 #[test]
 fn grains_that_use_the_same_faces_are_never_isolated() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
-        let check = |reaches| isolated_and_conflicting(scheme, reaches);
+        // One thread: the conflict is recorded, and no face is used by two threads.
+        let check = |reaches| isolated_and_conflicting(scheme, reaches, 1);
         // Closer than one reach, the recorder of borrowed rows finds the conflict in debug builds.
         let conflicts = cfg!(debug_assertions);
         for reaches in [0.1, 0.9] {

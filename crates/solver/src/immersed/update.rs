@@ -5,15 +5,13 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::Mutex;
 
-use super::advection::{
-    AdvectionCorrection, AdvectionScratch, GrainKinematics, add_correction, find_correction,
-};
+use super::advection::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::{LocateScratch, LocatedBody, Locator};
 use super::open_sides::Crossing;
 use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{add_rigid_gain, sum_impulse};
-use crate::dem::Grain;
+use crate::dem::{Grain, GrainKinematics};
 use crate::flow::{OldState, Prediction};
 use crate::grid::BorrowedRow;
 use crate::math::{Load, Real, RigidVelocity};

@@ -21,9 +21,11 @@ mod timing;
 
 use glam::DVec3;
 
-use crate::dem::{Contact, ContactDynamics, Grain, GrainResponse, RelativeOverlap, RigidState};
+use crate::dem::{
+    Contact, ContactDynamics, Grain, GrainKinematics, GrainResponse, RelativeOverlap, RigidState,
+};
 use crate::grid::Mesh;
-use crate::immersed::{GrainKinematics, OpenSides, PreviousStep};
+use crate::immersed::{OpenSides, PreviousStep};
 use crate::math::{Load, Pose};
 use crate::poisson::PoissonTimes;
 

@@ -7,10 +7,11 @@ use super::fluid::Fluid;
 use super::prescription::Prescription;
 use super::timing::PassTimes;
 use super::{GrainData, Simulation};
-use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
+use crate::dem::{
+    ContactDynamics, Grain, GrainKinematics, MotionConstraint, RigidState, TrialStep,
+};
 use crate::immersed::{
-    CoupledGrains, CouplingInput, Crossing, GrainKinematics, OpenSides, PreviousStep,
-    RigidityInput, Scheme,
+    CoupledGrains, CouplingInput, Crossing, OpenSides, PreviousStep, RigidityInput, Scheme,
 };
 use crate::math::{Load, RigidVelocity, timed};
 

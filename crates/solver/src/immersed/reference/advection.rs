@@ -6,8 +6,9 @@
 use glam::IVec3;
 
 use super::Reference;
+use crate::dem::GrainKinematics;
 use crate::flow::OldState;
-use crate::immersed::advection::{GrainKinematics, LARGEST_EXCESS};
+use crate::immersed::advection::LARGEST_EXCESS;
 use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
 

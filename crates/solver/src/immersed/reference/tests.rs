@@ -6,11 +6,11 @@ use glam::{DQuat, DVec3, IVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::Reference;
-use crate::dem::Grain;
+use crate::dem::{Grain, GrainKinematics};
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::Scheme;
-use crate::immersed::advection::{GrainKinematics, find_correction};
+use crate::immersed::advection::find_correction;
 use crate::immersed::forcing::{ForcedFaces, ForcingParams};
 use crate::immersed::geometry::aperture::forcing_reach;
 use crate::immersed::geometry::{LocateScratch, LocatedBody, Locator};
