@@ -53,10 +53,12 @@ impl InstructionSet {
     /// All instruction sets, the narrowest first.
     pub const ALL: [InstructionSet; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
-    /// Widest instruction set of this machine.
+    /// Widest instruction set of this machine. With `--cfg narrow_registers` it is the baseline: the
+    /// thread sanitizer ignores accesses of more than 16 bytes.
     #[cfg(target_arch = "x86_64")]
     pub fn widest() -> InstructionSet {
-        if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
+        let has_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        if cfg!(narrow_registers) || !has_avx2 {
             InstructionSet::Baseline
         } else if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
             InstructionSet::Avx512

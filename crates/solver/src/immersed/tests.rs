@@ -174,11 +174,17 @@ fn padding_of_rows_affects_no_link() {
     assert!(predicted(0.0) == predicted(f64::NAN));
 }
 
-/// Couples two spheres at a gap of `reaches` reaches between their surfaces on `threads` threads.
-/// Returns whether they were isolated, and whether their borrowed rows conflict if they are updated
-/// as isolated grains anyway.
-fn isolated_and_conflicting(scheme: Scheme, reaches: f64, threads: usize) -> (bool, bool) {
-    let mesh = Mesh { cells: [48, 24, 24], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
+/// Couples a row of `count` spheres, at a gap of `reaches` reaches between their surfaces, on
+/// `threads` threads. Returns whether they were isolated, and whether their borrowed rows conflict
+/// if they are updated as isolated grains anyway.
+fn isolated_and_conflicting(
+    scheme: Scheme,
+    reaches: f64,
+    count: usize,
+    threads: usize,
+) -> (bool, bool) {
+    let cells = [24 * count, 24, 24];
+    let mesh = Mesh { cells, spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
     let params = FluidParams {
         density: 1.0,
         kinematic_viscosity: 0.01,
@@ -189,13 +195,15 @@ fn isolated_and_conflicting(scheme: Scheme, reaches: f64, threads: usize) -> (bo
     flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
     let grain =
         |x: f64| Grain::new(Shape::sphere(0.5, 100), 2.0).with_position(DVec3::new(x, 1.52, 1.47));
-    let mut grains = [grain(1.55), grain(5.0)];
-    let reach = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains).locator.reach();
-    grains[1].pose.position.x = 1.55 + 1.0 + reaches * reach;
+    let reach = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &[grain(1.55)]).locator.reach();
+    // Neighbours are half of the grains apart in the list, so two threads update them at once.
+    let place = |n: usize| if 2 * n < count { 2 * n } else { 2 * n + 1 - count };
+    let at = |n: usize| 1.55 + (1.0 + reaches * reach) * place(n) as f64;
+    let grains: Vec<Grain> = (0..count).map(|n| grain(at(n))).collect();
     let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
     flow.predict(DT);
-    let kinematics = grains.each_ref().map(GrainKinematics::of);
-    let (previous, none) = ([PreviousStep::default(); 2], [Load::default(); 2]);
+    let kinematics: Vec<_> = grains.iter().map(GrainKinematics::of).collect();
+    let (previous, none) = (vec![PreviousStep::default(); count], vec![Load::default(); count]);
     let input = || CouplingInput {
         grains: &grains,
         kinematics: &kinematics,
@@ -228,8 +236,8 @@ fn isolated_and_conflicting(scheme: Scheme, reaches: f64, threads: usize) -> (bo
 #[test]
 #[ignore = "a data race on purpose, for the thread sanitizer"]
 fn touching_grains_that_are_updated_at_once_race() {
-    for _ in 0..20 {
-        isolated_and_conflicting(Scheme::Aperture, 0.1, 2);
+    for _ in 0..10 {
+        isolated_and_conflicting(Scheme::Aperture, 0.1, 16, 2);
     }
 }
 
@@ -237,7 +245,7 @@ fn touching_grains_that_are_updated_at_once_race() {
 fn grains_that_use_the_same_faces_are_never_isolated() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
         // One thread: the conflict is recorded, and no face is used by two threads.
-        let check = |reaches| isolated_and_conflicting(scheme, reaches, 1);
+        let check = |reaches| isolated_and_conflicting(scheme, reaches, 2, 1);
         // Closer than one reach, the recorder of borrowed rows finds the conflict in debug builds.
         let conflicts = cfg!(debug_assertions);
         for reaches in [0.1, 0.9] {

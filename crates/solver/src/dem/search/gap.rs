@@ -51,12 +51,8 @@ fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
     }
     let radius = owner.shape.bounding_radius();
     let start = SurfacePoint::at(field, best?.1)?;
-    let limits = DescentLimits {
-        stride: radius,
-        tolerance: TOLERANCE * radius,
-        iterations: ITERATIONS,
-        rejections: ITERATIONS,
-    };
+    let limits =
+        DescentLimits { stride: radius, tolerance: TOLERANCE * radius, iterations: ITERATIONS };
     Some(minimise_distance(&owner.shape, field, start, limits))
 }
 

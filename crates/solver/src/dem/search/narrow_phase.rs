@@ -188,7 +188,7 @@ fn scan_surface(
     found: &mut Vec<PenetratingPoint>,
 ) -> (f64, Option<SurfacePoint>) {
     let tree = owner.tree;
-    if let Some(deepest) = follow_contact(tree, partner, memory, found) {
+    if let Some(deepest) = follow_contact(owner, partner, memory, found) {
         add_deepest_point(owner, partner, deepest, found);
         return (f64::NEG_INFINITY, Some(deepest));
     }

@@ -3,7 +3,7 @@
 
 use super::deepest_point::{DEPTH_BELOW_NODES, LocalMinima};
 use super::node_tree::NodeTree;
-use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint};
+use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint};
 
 /// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
 const CANDIDATE_RANGE: f64 = 0.5;
@@ -97,16 +97,19 @@ pub(super) fn scan_candidates(
 /// Collects the penetrating nodes and returns the deepest point, from the last search in the same
 /// step; `None` if another node may penetrate or another point may be the deepest.
 pub(super) fn follow_contact(
-    tree: &NodeTree,
+    owner: &PosedShape,
     partner: &PartnerField,
-    memory: &SurfaceMemory,
+    memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
 ) -> Option<SurfacePoint> {
-    let deepest = memory.minima.deepest_known(partner).filter(|_| memory.slack > 0.0)?;
+    if memory.slack <= 0.0 {
+        return None;
+    }
+    let deepest = memory.minima.deepest_known(owner, partner)?;
     found.clear();
     for &(distance, index) in &memory.candidates {
         if distance < memory.approach {
-            test_node(tree, partner, index, f64::INFINITY, found);
+            test_node(owner.tree, partner, index, f64::INFINITY, found);
         }
     }
     Some(deepest)
