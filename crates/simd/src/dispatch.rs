@@ -53,7 +53,7 @@ impl InstructionSet {
     /// All instruction sets, the narrowest first.
     pub const ALL: [InstructionSet; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
-    /// Widest instruction set of this machine. With `--cfg narrow_registers` it is the baseline: the
+    /// Widest instruction set of this machine, or the baseline with `--cfg narrow_registers`: the
     /// thread sanitizer ignores accesses of more than 16 bytes.
     #[cfg(target_arch = "x86_64")]
     pub fn widest() -> InstructionSet {
