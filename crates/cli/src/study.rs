@@ -76,6 +76,13 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         tell!("note: {note}");
     }
     plan.create_folder(&folder)?;
+    let outdated = Archive::read(&folder).outdated(runs);
+    if outdated > 0 {
+        tell!(
+            "note: {} of table.json had another case, end or program and will be in table.earlier.json; --accept COMMIT counts those by another commit",
+            count(outdated, "finished run")
+        );
+    }
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
     if !args.quiet {

@@ -9,8 +9,8 @@ use std::time::Duration;
 use common::{STUDY, folder, plan};
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Archive, Options, Outcome, Plan, RunState, StateKind, Study, StudyObserver, execute, records,
-    run_state, to_csv, write_tables,
+    Archive, Options, Outcome, Plan, RunRecord, RunState, StateKind, Study, StudyObserver, execute,
+    records, run_state, to_csv, write_tables,
 };
 
 struct Quiet;
@@ -303,6 +303,41 @@ fn finished_runs_of_accepted_programs_count() {
     // An unfinished run of another program is not continued.
     std::fs::remove_file(plan.runs[0].folder(&study).join("summary.json")).unwrap();
     assert_eq!(kinds(&plan)[0], stale);
+}
+
+#[test]
+fn finished_runs_of_another_program_are_kept_in_the_earlier_table() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
+    // Another program made the first run; only the rows of the table are left.
+    let mut rows = records(&plan, &study);
+    rows[0].id = "0".repeat(rows[0].id.len());
+    write_tables(&rows, &study).unwrap();
+    std::fs::remove_dir_all(study.join("runs")).unwrap();
+    let outdated = || Archive::read(&study).outdated(&plan.runs);
+    assert_eq!(outdated(), 1);
+
+    let earlier = || -> Vec<RunRecord> {
+        let text = std::fs::read(study.join("table.earlier.json")).unwrap();
+        serde_json::from_slice(&text).unwrap()
+    };
+    for _ in 0..2 {
+        write_tables(&records(&plan, &study), &study).unwrap();
+        assert_eq!(earlier(), rows[..1], "the row is kept once");
+    }
+    assert_eq!(outdated(), 0);
+    assert!(records(&plan, &study)[4].finished());
+    // A second outdated row joins the first.
+    let mut changed = records(&plan, &study);
+    changed[4].id.clone_from(&rows[0].id);
+    write_tables(&changed, &study).unwrap();
+    write_tables(&records(&plan, &study), &study).unwrap();
+    let names: Vec<String> = earlier().into_iter().map(|row| row.name).collect();
+    assert_eq!(names, [&rows[0].name, &rows[4].name].map(String::clone));
+    plan.create_folder(&study).unwrap();
 }
 
 #[test]

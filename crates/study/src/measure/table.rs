@@ -7,8 +7,8 @@ use super::record::RunRecord;
 use super::settling::GrainSettling;
 use crate::error::{At, StudyError, write_file, write_json};
 use crate::format::rounded;
-use crate::plan::TABLE;
 use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
+use crate::plan::{EARLIER_TABLE, TABLE};
 
 /// Table of the grains of all runs that are not pairs, in the study folder.
 pub const SETTLING_TABLE: &str = "settling.csv";
@@ -32,16 +32,37 @@ const SETTLING_HEADER: [&str; 15] = [
     "turned_deg",
 ];
 
-/// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`.
+/// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`. Finished
+/// runs of the last `table.json` that the records lack are kept in `table.earlier.json`.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
+    keep_finished_runs(records, study)?;
     write_json(&study.join(TABLE), &records)?;
     if records.iter().any(|record| record.settling.is_some()) {
         write_csv(&study.join(SETTLING_TABLE), settling_rows(records))?;
     }
     write_csv(&study.join("table.csv"), rows(records))
+}
+
+/// Adds the finished runs of `table.json` that the records lack to `table.earlier.json`.
+fn keep_finished_runs(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
+    let finished = |file: &str| {
+        let text = std::fs::read_to_string(study.join(file)).unwrap_or_default();
+        let rows: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
+        rows.into_iter().filter(RunRecord::finished)
+    };
+    let same = |a: &RunRecord, b: &RunRecord| a.name == b.name && a.id == b.id;
+    let is_in = |rows: &[RunRecord], row: &RunRecord| rows.iter().any(|other| same(other, row));
+    let lost: Vec<RunRecord> = finished(TABLE).filter(|row| !is_in(records, row)).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let mut earlier: Vec<RunRecord> =
+        finished(EARLIER_TABLE).filter(|row| !is_in(&lost, row)).collect();
+    earlier.extend(lost);
+    write_json(&study.join(EARLIER_TABLE), &earlier)
 }
 
 /// Writes rows of cells as comma-separated values.

@@ -31,11 +31,15 @@ pub const MANIFEST: &str = "study.json";
 /// File of a study folder with a record of every run.
 pub const TABLE: &str = "table.json";
 
+/// File of a study folder with the finished runs that are no longer in [`TABLE`].
+pub const EARLIER_TABLE: &str = "table.earlier.json";
+
 /// Other files and folders of a study folder.
-const WRITTEN: [&str; 8] = [
+const WRITTEN: [&str; 9] = [
     "locks",
     "table.csv",
     TABLE,
+    EARLIER_TABLE,
     "settling.csv",
     "histories",
     "figures",

@@ -92,6 +92,13 @@ impl Archive {
     pub fn contains(&self, run: &Run) -> bool {
         run.ids().any(|id| self.0.contains(&(run.name.clone(), id.clone())))
     }
+
+    /// Returns how many of the `runs` had finished with another case, end or program only.
+    pub fn outdated(&self, runs: &[Run]) -> usize {
+        let names: BTreeSet<&str> = self.0.iter().map(|(name, _)| name.as_str()).collect();
+        let outdated = |run: &&Run| names.contains(run.name.as_str()) && !self.contains(run);
+        runs.iter().filter(outdated).count()
+    }
 }
 
 /// Determines the state of a run. A run without a folder is finished if the archive contains it.
