@@ -52,8 +52,9 @@ thread() {
   [ -d "$library" ] || { missing thread "no nightly with rust-src"; return; }
   # The sanitizer ignores accesses of more than 16 bytes: kernels use the narrowest registers.
   thread_tests() { # ARGUMENTS
-    RUSTFLAGS="-Zsanitizer=thread --cfg narrow_registers" cargo +nightly test -Zbuild-std --release --target "$host" \
-      --target-dir target/thread -p grainwake-solver --lib --test sharing -- "$@"
+    RUSTFLAGS="-Zsanitizer=thread --cfg narrow_registers" \
+      cargo +nightly test -Zbuild-std --release --target "$host" --target-dir target/thread \
+      -p grainwake-solver --lib --test sharing -- "$@"
   }
   thread_tests immersed sharing
   # The check can fail: a test that races on purpose must be reported.

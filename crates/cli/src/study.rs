@@ -79,7 +79,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let outdated = Archive::read(&folder).outdated(runs);
     if outdated > 0 {
         tell!(
-            "note: {} of table.json had another case, end or program and will be in table.earlier.json; --accept COMMIT counts those by another commit",
+            "note: {} in table.json had another case, end or program: their rows move to table.earlier.json (--accept COMMIT counts those of another commit)",
             count(outdated, "finished run")
         );
     }

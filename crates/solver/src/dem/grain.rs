@@ -81,8 +81,8 @@ impl Grain {
     }
 }
 
-/// Position at the last time level, and velocities that the grain has during the step: a prescribed
-/// velocity is set before the flow is predicted.
+/// Position of a grain at the start of a step, and its velocities during the step: a prescribed
+/// velocity is set before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GrainKinematics {
     /// Centroid [m].

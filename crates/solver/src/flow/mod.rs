@@ -114,7 +114,6 @@ impl<R: Real> Flow<R> {
             crossing_speeds: [[0.0; 2]; 3],
         };
         flow.non_temporal = flow.bytes() > last_cache() / 4 * 3;
-        flow.poisson.non_temporal = flow.non_temporal;
         flow.velocity.fill(params.initial_velocity);
         flow.make_solenoidal();
         flow
@@ -200,36 +199,42 @@ impl<R: Real> Flow<R> {
         let FaceVector { x, y, z } = &mut self.velocity;
         let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
         let partial = &mut self.partial;
-        self.poisson.solve(divergence, fields, partial, |k, solution, [x, y, z, p], measures| {
-            dispatch(Correct {
-                layout,
-                predicted,
-                solution,
-                periodic,
-                k,
-                inverse,
-                dt_per_h: inverse.map(|inverse| dt * inverse),
-                non_temporal,
-                velocity: [&mut *x, &mut *y, &mut *z],
-                pressure: &mut *p,
-                measures,
-            });
-            // The upper boundary faces keep the predicted velocity.
-            if !periodic[0] {
-                for j in 1..=ny {
-                    let at = j * row + nx + 1;
-                    x[at] = predicted.x[k * plane + at];
+        self.poisson.solve(
+            non_temporal,
+            divergence,
+            fields,
+            partial,
+            |k, solution, [x, y, z, p], measures| {
+                dispatch(Correct {
+                    layout,
+                    predicted,
+                    solution,
+                    periodic,
+                    k,
+                    inverse,
+                    dt_per_h: inverse.map(|inverse| dt * inverse),
+                    non_temporal,
+                    velocity: [&mut *x, &mut *y, &mut *z],
+                    pressure: &mut *p,
+                    measures,
+                });
+                // The upper boundary faces keep the predicted velocity.
+                if !periodic[0] {
+                    for j in 1..=ny {
+                        let at = j * row + nx + 1;
+                        x[at] = predicted.x[k * plane + at];
+                    }
                 }
-            }
-            if !periodic[1] {
-                let upper = (ny + 1) * row..(ny + 2) * row;
-                y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
-            }
-            for (component, q) in [x, y, z].into_iter().enumerate() {
-                boundaries.fill_ghosts_of_plane(layout, component, q);
-            }
-            boundaries.fill_pressure_of_plane(layout, p);
-        });
+                if !periodic[1] {
+                    let upper = (ny + 1) * row..(ny + 2) * row;
+                    y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
+                }
+                for (component, q) in [x, y, z].into_iter().enumerate() {
+                    boundaries.fill_ghosts_of_plane(layout, component, q);
+                }
+                boundaries.fill_pressure_of_plane(layout, p);
+            },
+        );
         if !periodic[2] {
             let upper = (nz + 1) * plane..;
             z[upper.clone()].copy_from_slice(&predicted.z[upper]);

@@ -376,7 +376,6 @@ fn bits_of_a_step_do_not_depend_on_the_caches() {
             Mesh { cells: [29, 11, 9], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
         let mut flow = Flow::<R>::new(&mesh, boundaries, &params(0.01));
         flow.non_temporal = non_temporal;
-        flow.poisson.non_temporal = non_temporal;
         flow.start_from(|axis, x| (x + DVec3::new(0.1, 0.2, 0.3)).to_array()[axis].sin());
         let mut kept = Vec::new();
         for _ in 0..3 {

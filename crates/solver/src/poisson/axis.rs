@@ -71,11 +71,11 @@ struct TransformLines<'a, R> {
     axis: &'a AxisTransform<R>,
     /// Both buffers, one after the other; the first holds the lines.
     buffers: &'a mut [R],
-    /// Whether modes are transformed to cells.
+    /// True for modes to cells, false for cells to modes.
     inverse: bool,
-    /// Whether the lines have half the lanes of the widest register.
+    /// True if a register of the lines is half as wide as the widest one.
     half: bool,
-    /// Set to whether the second buffer holds the result.
+    /// Receives true if the result is in the second buffer.
     second: &'a mut bool,
 }
 

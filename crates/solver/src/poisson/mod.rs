@@ -69,8 +69,6 @@ pub struct Poisson<R = f64> {
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
     times: PoissonTimes,
-    /// Whether the modes are written with non-temporal stores.
-    pub non_temporal: bool,
 }
 
 /// Scratch of one range of planes.
@@ -84,9 +82,11 @@ impl<R: Real> Poisson<R> {
     /// Solves for the right-hand side whose plane k = 1..=nz `source` writes (rows 1..=ny, entries
     /// 1..=nx), and hands each plane of the solution to `sink` with the same plane of `fields` and
     /// its `partial` result. Where the solution is defined up to a constant, the mean of the
-    /// right-hand side must be zero, and one value of the mean mode is set to zero.
+    /// right-hand side must be zero, and one value of the mean mode is set to zero. The modes are
+    /// written with non-temporal stores if `non_temporal`.
     pub fn solve<const N: usize, T: Send>(
         &mut self,
+        non_temporal: bool,
         source: impl Fn(usize, &mut Plane<R>) + Sync,
         fields: [&mut [R]; N],
         partial: &mut [T],
@@ -94,7 +94,6 @@ impl<R: Real> Poisson<R> {
     ) {
         let (axes, stride, nz) = (&self.axes, self.layout.stride(), self.mesh.cells[2]);
         let range = nz.div_ceil(self.slots.len());
-        let non_temporal = self.non_temporal;
 
         let start = Stopwatch::start();
         let ranges = self.modes.par_chunks_mut(range * stride).enumerate();

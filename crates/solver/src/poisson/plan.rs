@@ -55,7 +55,6 @@ impl<R: Real> Poisson<R> {
                 .collect(),
             axes,
             times: PoissonTimes::default(),
-            non_temporal: false,
         }
     }
 

@@ -18,7 +18,7 @@ impl<R: Real> Poisson<R> {
                 plane.row_mut(j)[1..=nx].copy_from_slice(&given.row(j, k)[1..=nx]);
             }
         };
-        self.solve(source, [field], &mut vec![(); nz], |_, solution, [plane], ()| {
+        self.solve(false, source, [field], &mut vec![(); nz], |_, solution, [plane], ()| {
             for j in 1..=ny {
                 let at = layout.row() * j;
                 plane[at + 1..=at + nx].copy_from_slice(&solution.here.row(j)[1..=nx]);

@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use serde_json::Value;
+
 use super::record::RunRecord;
 use super::settling::GrainSettling;
 use crate::error::{At, StudyError, write_file, write_json};
@@ -32,11 +34,11 @@ const SETTLING_HEADER: [&str; 15] = [
     "turned_deg",
 ];
 
-/// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`. Finished
-/// runs of the last `table.json` that the records lack are kept in `table.earlier.json`.
+/// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`. Finished runs of
+/// the last `table.json` that the records lack are kept in `table.earlier.json`.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// If a file cannot be written, or `table.earlier.json` is damaged.
 pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
     keep_finished_runs(records, study)?;
     write_json(&study.join(TABLE), &records)?;
@@ -46,23 +48,31 @@ pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyErro
     write_csv(&study.join("table.csv"), rows(records))
 }
 
-/// Adds the finished runs of `table.json` that the records lack to `table.earlier.json`.
+/// Adds the finished runs of `table.json` that the records lack to `table.earlier.json`. The rows
+/// are copied as they are, whatever program wrote them.
 fn keep_finished_runs(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
-    let finished = |file: &str| {
-        let text = std::fs::read_to_string(study.join(file)).unwrap_or_default();
-        let rows: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
-        rows.into_iter().filter(RunRecord::finished)
-    };
-    let same = |a: &RunRecord, b: &RunRecord| a.name == b.name && a.id == b.id;
-    let is_in = |rows: &[RunRecord], row: &RunRecord| rows.iter().any(|other| same(other, row));
-    let lost: Vec<RunRecord> = finished(TABLE).filter(|row| !is_in(records, row)).collect();
+    fn key(row: &Value) -> [Option<&str>; 2] {
+        ["name", "id"].map(|key| row[key].as_str())
+    }
+    let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
+    let mut lost: Vec<Value> = serde_json::from_str(&text).unwrap_or_default();
+    let present: BTreeSet<_> =
+        records.iter().map(|r| [r.name.as_str(), r.id.as_str()].map(Some)).collect();
+    lost.retain(|row| row["state"] == "finished" && !present.contains(&key(row)));
     if lost.is_empty() {
         return Ok(());
     }
-    let mut earlier: Vec<RunRecord> =
-        finished(EARLIER_TABLE).filter(|row| !is_in(&lost, row)).collect();
-    earlier.extend(lost);
-    write_json(&study.join(EARLIER_TABLE), &earlier)
+    let file = study.join(EARLIER_TABLE);
+    if file.exists() {
+        let text = std::fs::read_to_string(&file).at("read", &file)?;
+        let earlier: Vec<Value> =
+            serde_json::from_str(&text).map_err(std::io::Error::from).at("read", &file)?;
+        let kept =
+            earlier.into_iter().filter(|row| lost.iter().all(|other| key(other) != key(row)));
+        let kept: Vec<Value> = kept.collect();
+        lost.splice(0..0, kept);
+    }
+    write_json(&file, &lost)
 }
 
 /// Writes rows of cells as comma-separated values.

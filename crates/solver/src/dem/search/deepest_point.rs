@@ -13,8 +13,8 @@ use grainwake_shape::{Field, Shape};
 
 use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint, project_to_surface};
 
-/// Largest depth of the surface below its nodes that the search assumes [node spacings]. Twice the
-/// value finds more of the minima and doubles the time of a falling heap.
+/// Largest depth of the surface below its nodes that the search assumes [node spacings]. A larger
+/// value finds more of the minima and costs more descents.
 pub(super) const DEPTH_BELOW_NODES: f64 = 0.1;
 /// Least distance between the nodes from which descents start [node spacings].
 const START_DISTANCE: f64 = 1.0;
@@ -38,8 +38,7 @@ const TOLERANCE_OF_SPHERES: f64 = 1e-5;
 pub(super) struct LocalMinima {
     /// Positions in the principal frame [m].
     positions: Vec<DVec3>,
-    /// Distance by which the surfaces may move until the minima are found again from their last
-    /// positions [m].
+    /// Distance by which the surfaces may move until descents start from these positions [m].
     slack: f64,
     /// Distance by which the surfaces may move until another minimum may be the deepest [m].
     range: f64,
