@@ -21,6 +21,9 @@ pub fn horizontal(
         drawing.line(&[(x, bottom), (x, bottom + TICK)], INK, HAIR, None);
         if labelled {
             let y = bottom + TICK + SMALL + 0.5;
+            // A long label at the right end stays on the drawing.
+            let half = 0.5 * text::width(name, SMALL);
+            let x = x.min(drawing.width() - half - 1.0).max(half);
             drawing.label((x, y), Anchor::Middle, SMALL, INK, name);
         }
     }

@@ -69,7 +69,7 @@ fn heap() -> (ContactDynamics, Vec<Grain>) {
         lower: DVec3::ZERO,
         upper: DVec3::splat(size),
         periodic: [true; 3],
-        solid: [[false; 2]; 3],
+        sides: Default::default(),
     };
     (ContactDynamics::new(ContactParams::default(), enclosure), grains)
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use dem_support::{cloud, step};
 use glam::DVec3;
 use grainwake_solver::dem::{
-    ContactDynamics, ContactParams, Enclosure, Grain, GrainResponse, RigidState,
+    ContactDynamics, ContactParams, Enclosure, Grain, GrainResponse, RigidState, Side,
 };
 use grainwake_solver::math::Load;
 
@@ -40,7 +40,7 @@ fn a_heap_at_rest_steps_without_allocating() {
         lower: DVec3::splat(-0.05),
         upper: DVec3::new(0.05, 0.05, 0.2),
         periodic: [true, false, false],
-        solid: [[false; 2], [true; 2], [true, false]],
+        sides: [[Side::Open; 2], [Side::WALL; 2], [Side::WALL, Side::Open]],
     };
     let params = ContactParams {
         normal_stiffness: 500.0,

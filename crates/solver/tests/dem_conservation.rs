@@ -107,7 +107,7 @@ fn both_bodies_get_opposite_loads_to_round_off() {
 }
 
 fn periodic(size: DVec3) -> Enclosure {
-    Enclosure { lower: DVec3::ZERO, upper: size, periodic: [true; 3], solid: [[false; 2]; 3] }
+    Enclosure { lower: DVec3::ZERO, upper: size, periodic: [true; 3], sides: Default::default() }
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod dem_support;
 
 use dem_support::{floor, sphere, step};
 use glam::DVec3;
-use grainwake_solver::dem::{ContactDynamics, ContactParams, MotionConstraint};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, Grain, MotionConstraint, Side};
 
 #[test]
 fn dem04_slip_becomes_rolling_at_two_sevenths() {
@@ -44,6 +44,42 @@ fn dem04_slip_becomes_rolling_at_two_sevenths() {
         assert!((v - 5.0 / 7.0).abs() < 0.005, "{v}");
         assert!((w - 5.0 / 7.0).abs() < 0.005, "{w}");
     }
+}
+
+/// Sphere that is put on the floor with a velocity, after 0.05 s: it slides, then rolls.
+fn slid(velocity: DVec3, floor_side: Side) -> Grain {
+    let (radius, k, g) = (5e-4, 1e4, 9.81);
+    let mut grain = sphere(radius, 2000.0, 4000, DVec3::ZERO);
+    grain.pose.position.z = radius - grain.mass() * g / k;
+    grain.velocity = velocity;
+    let params = ContactParams { normal_stiffness: k, wall_friction: 0.3, ..Default::default() };
+    let mut enclosure = floor();
+    enclosure.sides[2][0] = floor_side;
+    let (mut grains, mut dynamics) = ([grain], ContactDynamics::new(params, enclosure));
+    for _ in 0..500 {
+        step(&mut dynamics, &mut grains, DVec3::new(0.0, 0.0, -g), 1e-4);
+    }
+    let [grain] = grains;
+    grain
+}
+
+#[test]
+fn a_moving_floor_carries_a_sphere_as_a_floor_at_rest_stops_it() {
+    let belt = DVec3::new(0.06, -0.08, 0.0);
+    let carried = slid(DVec3::ZERO, Side::Wall { velocity: belt });
+    let stopped = slid(-belt, Side::WALL);
+    // The same motion in two frames of reference: the sphere ends at 2/7 of the speed of the belt.
+    assert!((carried.velocity - belt - stopped.velocity).length() < 1e-12);
+    assert!((carried.angular_velocity - stopped.angular_velocity).length() < 1e-9);
+    assert!((carried.velocity - 2.0 / 7.0 * belt).length() < 0.005 * belt.length());
+}
+
+#[test]
+fn a_sphere_slides_on_over_a_slip_wall() {
+    let grain = slid(DVec3::new(0.1, 0.0, 0.0), Side::Frictionless);
+    // The nodes of the sphere are not quite even.
+    let spin = 5e-4 * grain.angular_velocity.length();
+    assert!((grain.velocity.x - 0.1).abs() < 1e-4 && spin < 1e-4, "{} {spin}", grain.velocity);
 }
 
 /// Rebound of the sphere of Kharaz, Gorham & Salman: angle from the normal [deg], ratio of the

@@ -4,7 +4,9 @@ mod dem_support;
 
 use dem_support::{Random, floor, open_box, sphere};
 use glam::DVec3;
-use grainwake_solver::dem::{Enclosure, Partner, initial_overlaps, outside, surface_gap, wall_gap};
+use grainwake_solver::dem::{
+    Enclosure, Partner, Side, initial_overlaps, outside, surface_gap, wall_gap,
+};
 
 #[test]
 fn gap_of_spheres_is_exact_at_any_distance() {
@@ -30,7 +32,7 @@ fn gap_takes_the_nearest_image() {
         lower: DVec3::ZERO,
         upper: DVec3::new(1.0, 2.0, 2.0),
         periodic: [true, true, false],
-        solid: [[false; 2]; 3],
+        sides: Default::default(),
     };
     let a = sphere(0.1, 1.0, 60, DVec3::new(0.1, 0.2, 0.5));
     let b = sphere(0.1, 1.0, 60, DVec3::new(0.9, 1.9, 0.6));
@@ -44,7 +46,7 @@ fn wall_gap_names_the_nearest_solid_face() {
         lower: DVec3::ZERO,
         upper: DVec3::new(1.0, 1.0, 3.0),
         periodic: [false; 3],
-        solid: [[true, true], [false, false], [true, false]],
+        sides: [[Side::WALL, Side::WALL], [Side::Open, Side::Open], [Side::WALL, Side::Open]],
     };
     let grain = sphere(0.2, 1.0, 60, DVec3::new(0.75, 0.2, 2.75));
     let (gap, wall) = wall_gap(&grain, &enclosure).unwrap();
@@ -72,7 +74,7 @@ fn initial_overlaps_are_found_with_their_depth() {
         lower: DVec3::ZERO,
         upper: DVec3::splat(0.95),
         periodic: [true; 3],
-        solid: [[false; 2]; 3],
+        sides: Default::default(),
     };
     let own = initial_overlaps(&grains[2..], &narrow);
     assert_eq!(own.len(), 1);

@@ -369,7 +369,7 @@ fn irregular_contact_across_a_periodic_face_is_the_same() {
             lower: DVec3::ZERO,
             upper: DVec3::splat(0.2),
             periodic: [true; 3],
-            solid: [[false; 2]; 3],
+            sides: Default::default(),
         };
         let turn = DQuat::from_scaled_axis(DVec3::new(0.4, -0.2, 0.9));
         let mut grains = [
@@ -427,4 +427,31 @@ fn pairs_that_are_not_looked_at_do_not_miss_a_contact() {
     for (a, b) in long.iter().zip(&short) {
         assert!((a.0 - b.0).length() < 1e-9 && (a.1 - b.1).length() < 1e-6, "{a:?} {b:?}");
     }
+}
+
+/// Without friction nothing turns a sphere that rolls over a flat face: the force acts in the line
+/// through its centre.
+#[test]
+fn a_sphere_keeps_its_spin_on_a_frictionless_face() {
+    let options = ShapeOptions { nodes: Some(2000), ..ShapeOptions::default() };
+    let plate = analytic::rounded_box(30.0, 6.0, 2.0, 0.5, &options).unwrap();
+    let mut plate = Grain::new(plate, 1.0).with_position(DVec3::new(0.0, 0.0, -1.0));
+    plate.translation = MotionConstraint::Prescribed(DVec3::ZERO);
+    plate.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+    let mut ball = Grain::new(Shape::sphere(1.0, 600), 1.0);
+    // The overlap carries the weight.
+    let stiffness = 1e4;
+    ball.pose.position = DVec3::new(-5.0, 0.1, 1.0 - ball.mass() / stiffness);
+    ball.velocity.x = 0.2;
+    ball.angular_velocity.y = 0.2;
+    let params = smooth(stiffness);
+    let mut dynamics = ContactDynamics::new(params, open_box(20.0));
+    let mut grains = [plate, ball];
+    for _ in 0..500 {
+        step(&mut dynamics, &mut grains, DVec3::NEG_Z, 0.02);
+    }
+    let Grain { velocity, angular_velocity, pose, .. } = &grains[1];
+    println!("{} {velocity} {angular_velocity}", pose.position);
+    assert!((velocity - DVec3::new(0.2, 0.0, 0.0)).length() < 2e-3, "{velocity}");
+    assert!((angular_velocity - DVec3::new(0.0, 0.2, 0.0)).length() < 2e-3, "{angular_velocity}");
 }

@@ -5,7 +5,7 @@ mod dem_support;
 use dem_support::{floor, open_box, smooth, sphere, step};
 use glam::DVec3;
 use grainwake_solver::dem::{
-    ContactDynamics, ContactParams, Enclosure, Grain, MotionConstraint, Partner,
+    ContactDynamics, ContactParams, Enclosure, Grain, MotionConstraint, Partner, Side,
 };
 use grainwake_solver::math::Load;
 
@@ -118,7 +118,7 @@ fn dem03_two_stacked_compressed_spheres() {
         lower: DVec3::new(-1e-3, -1e-3, 0.0),
         upper: DVec3::new(1e-3, 1e-3, height),
         periodic: [false; 3],
-        solid: [[false; 2], [false; 2], [true, true]],
+        sides: [[Side::Open; 2], [Side::Open; 2], [Side::WALL, Side::WALL]],
     };
     let params = ContactParams { substeps_per_contact: 100.0, ..smooth(k) };
     let mut dynamics = ContactDynamics::new(params, enclosure);

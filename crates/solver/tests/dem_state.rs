@@ -5,7 +5,7 @@ mod dem_support;
 use dem_support::{Random, bits, cloud, step};
 use glam::DVec3;
 use grainwake_solver::dem::{
-    ContactDynamics, ContactLawKind, ContactParams, Enclosure, Grain, Material,
+    ContactDynamics, ContactLawKind, ContactParams, Enclosure, Grain, Material, Side,
 };
 
 fn params() -> ContactParams {
@@ -17,7 +17,7 @@ fn tank() -> Enclosure {
         lower: DVec3::new(-0.05, -0.05, -0.06),
         upper: DVec3::new(0.05, 0.05, 0.2),
         periodic: [true, false, false],
-        solid: [[false; 2], [true; 2], [true, false]],
+        sides: [[Side::Open; 2], [Side::WALL; 2], [Side::WALL, Side::Open]],
     }
 }
 

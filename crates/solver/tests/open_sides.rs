@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
-use grainwake_solver::dem::{ContactParams, Grain};
+use grainwake_solver::dem::{ContactParams, Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::{EventKind, EventParams, StopWhen, Tracker};
@@ -231,4 +231,37 @@ fn a_floating_sphere_heaves_with_the_period_of_potential_flow() {
     assert!((period / expected - 1.0).abs() < 0.04, "period {period}, expected {expected}");
     let decays = extremes.windows(2).all(|pair| pair[1] < pair[0]);
     assert!(decays, "a heave gains no energy: {extremes:?}");
+}
+
+/// A floating sphere in hydrostatic balance that drifts towards an outflow keeps floating: the part
+/// out of the fluid has no buoyancy there either.
+#[test]
+fn a_floating_grain_floats_on_next_to_an_outflow() {
+    let mut floating = sphere(0.5, [0.0, 2.0, 4.0]);
+    floating.velocity = DVec3::new(0.1, 0.0, 0.0);
+    // Its surface is within two cells of the side at x = 4.
+    floating.pose.position.x = 3.3;
+    let mut case = setup([32; 3], [Boundary::WALL, Boundary::FreeSurface], 0.05, vec![floating]);
+    let inflow = Boundary::Inflow { velocity: DVec3::new(0.1, 0.0, 0.0) };
+    case.boundaries.0[0] = [inflow, Boundary::Outflow];
+    let mut sim = Simulation::new(case).unwrap();
+    while sim.time() < 0.5 {
+        step(&mut sim);
+        let rise = sim.grains()[0].velocity.z;
+        assert!(rise.abs() < 0.05, "speed {rise} at t = {}", sim.time());
+    }
+}
+
+#[test]
+fn a_grain_of_prescribed_velocity_is_at_rest_when_it_has_left() {
+    let mut moved = sphere(2.0, [2.0, 2.0, 0.7]);
+    moved.velocity = DVec3::new(0.0, 0.0, -1.0);
+    moved.translation = MotionConstraint::Prescribed(moved.velocity);
+    let sides = [Boundary::Outflow, Boundary::WALL];
+    let mut sim = Simulation::new(setup([32; 3], sides, 0.05, vec![moved])).unwrap();
+    while sim.time() < 2.0 {
+        step(&mut sim);
+    }
+    assert!(sim.grains()[0].has_left());
+    assert_eq!(sim.diagnostics().grain_kinetic_energy, 0.0);
 }

@@ -168,6 +168,7 @@ impl Region<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use grainwake_solver::dem::Side;
     use rand::SeedableRng;
 
     fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Sphere]) -> Region<'a> {
@@ -185,7 +186,7 @@ mod tests {
             lower: DVec3::ZERO,
             upper: DVec3::new(1.0, 1.0, 3.0),
             periodic: [false; 3],
-            solid: [[true; 2]; 3],
+            sides: [[Side::WALL; 2]; 3],
         }
     }
 

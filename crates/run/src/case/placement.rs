@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::raw::{Orientation, Turns};
-use grainwake_solver::dem::{Enclosure, Grain, wall_gap};
+use grainwake_solver::dem::{Enclosure, Grain, Side, wall_gap};
 
 /// Returns the orientation of a grain after its turns. The principal frame of a shape has the
 /// longest axis along x and the shortest along z.
@@ -50,13 +50,13 @@ pub(super) fn extent_along(grain: &Grain, axis: usize) -> (f64, f64) {
     let margin = 2.0 * grain.shape.bounding_radius();
     let centre = grain.pose.position;
     let side = |side: usize| {
-        let mut solid = [[false; 2]; 3];
-        solid[axis][side] = true;
+        let mut sides: [[Side; 2]; 3] = Default::default();
+        sides[axis][side] = Side::WALL;
         let box_around = Enclosure {
             lower: centre - margin,
             upper: centre + margin,
             periodic: [false; 3],
-            solid,
+            sides,
         };
         wall_gap(grain, &box_around).map_or(margin, |(gap, _)| gap)
     };

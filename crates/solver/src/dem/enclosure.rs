@@ -12,8 +12,36 @@ pub struct Enclosure {
     pub upper: DVec3,
     /// Periodic axes: grains interact with images along them.
     pub periodic: [bool; 3],
-    /// Faces `[axis][side]` that are walls for a grain; ignored along periodic axes.
-    pub solid: [[bool; 2]; 3],
+    /// Faces `[axis][side]`, 0 lower and 1 upper; ignored along periodic axes.
+    pub sides: [[Side; 2]; 3],
+}
+
+/// Face of the box for a grain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Side {
+    /// No wall.
+    #[default]
+    Open,
+    /// Wall with friction.
+    Wall {
+        /// Velocity of the wall in its own plane [m/s].
+        velocity: DVec3,
+    },
+    /// Wall without friction.
+    Frictionless,
+}
+
+impl Side {
+    /// A wall with friction, at rest.
+    pub const WALL: Side = Side::Wall { velocity: DVec3::ZERO };
+
+    /// Velocity of a wall in its own plane [m/s].
+    pub(super) fn velocity(self) -> DVec3 {
+        match self {
+            Side::Wall { velocity } => velocity,
+            Side::Open | Side::Frictionless => DVec3::ZERO,
+        }
+    }
 }
 
 /// Face of the box as a half space: a grain inside the box is on the side of `inward`.
@@ -53,7 +81,7 @@ impl Enclosure {
     }
     /// Face `side` of `axis`, if it is a wall for grains.
     pub(super) fn face(&self, axis: usize, side: usize) -> Option<WallFace> {
-        let solid = self.solid[axis][side] && !self.is_periodic(axis);
+        let solid = self.sides[axis][side] != Side::Open && !self.is_periodic(axis);
         solid.then(|| self.plane(axis, side))
     }
     /// Face `side` of `axis` as a plane, solid or not.
@@ -141,7 +169,7 @@ mod tests {
             lower: DVec3::new(-1.0, 0.0, 0.0),
             upper: DVec3::new(1.0, 2.0, 3.0),
             periodic: [true, false, false],
-            solid: [[true, true], [true, false], [false, false]],
+            sides: [[Side::WALL; 2], [Side::WALL, Side::Open], [Side::Open; 2]],
         }
     }
 

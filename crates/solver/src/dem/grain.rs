@@ -41,10 +41,12 @@ pub struct Grain {
 }
 
 impl Grain {
-    /// Removes the grain from the box: it is at rest at infinity from now on.
+    /// Removes the grain from the box: it is held at rest at infinity from now on.
     pub fn leave(&mut self) {
         self.pose.position = DVec3::INFINITY;
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        let held = MotionConstraint::Prescribed(DVec3::ZERO);
+        (self.translation, self.rotation) = (held, held);
     }
     /// Returns whether the grain has left the box.
     pub fn has_left(&self) -> bool {
@@ -81,13 +83,13 @@ impl Grain {
     }
 }
 
-/// Position of a grain at the start of a step, and its velocities during the step: a prescribed
-/// velocity is set before.
+/// Position and velocities of a grain at the start of a step; prescribed velocities are those of
+/// the step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GrainKinematics {
     /// Centroid [m].
     pub position: DVec3,
-    /// Velocities during the step.
+    /// Velocities.
     pub velocity: RigidVelocity,
 }
 

@@ -21,7 +21,7 @@ mod motion;
 mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
-pub use enclosure::{Enclosure, Partner};
+pub use enclosure::{Enclosure, Partner, Side};
 pub(crate) use grain::GrainKinematics;
 pub use grain::{Grain, MotionConstraint};
 pub use material::Material;

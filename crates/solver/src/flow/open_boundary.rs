@@ -66,7 +66,8 @@ impl<R: Real> Flow<R> {
         self.crossing_speeds = speeds;
     }
 
-    /// Sets the outflow faces of the prediction over `dt` [s]; the other boundary faces are set.
+    /// Sets the outflow faces of the prediction over `dt` [s] and balances the volume. The other
+    /// boundary faces must have been set.
     pub(super) fn convect_outflow(&mut self, dt: f64) {
         let has_outflow = |side: BoxSide| side.boundary(&self.boundaries) == Boundary::Outflow;
         if !BoxSide::all().any(has_outflow) {

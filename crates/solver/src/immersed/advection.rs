@@ -5,7 +5,7 @@
 //!
 //! 1. A face value near the surface represents the open part of the face only, q = A u. The product
 //!    of two such values carries A^2 u u where the flux is A u u. The flux relative to the grain is
-//!    therefore divided by the aperture A of the link.
+//!    therefore divided by the limited aperture A' = A + 0.2 (1 - A)^2 of the link.
 //! 2. The boundary layer is about one cell thick and moves with the grain. Second-order central
 //!    differences advect such a profile at about two thirds of its speed. Within two half-widths of
 //!    the band around the surface the sixth-order mean of six faces replaces the mean of two.
@@ -13,12 +13,12 @@
 //! The correction adds to the flux over h
 //!
 //! ```text
-//! (1/A - 1) (q_mean - U_q) (c - U_c) / h
+//! (1/A' - 1) (q_mean - U_q) (c - U_c) / h
 //! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
 //! ```
 //!
 //! The second term is left out at the ends of the grid, where fewer than six faces are in line.
-//! |(1/A - 1) (c - U_c)| is limited to 100 nu / h: through a face that is almost closed, a jet out
+//! |(1/A' - 1) (c - U_c)| is limited to 100 nu / h: through a face that is almost closed, a jet out
 //! of the grain would otherwise accelerate itself without bound
 //! (`docs/decisions/0023-jets-out-of-closed-faces.md`).
 //! Both are fluxes between two faces, so momentum is conserved
@@ -26,7 +26,7 @@
 //! `immersed::reference` has the scalar form.
 //!
 //! Legend: q advected component, c advecting velocity, U rigid velocity at the middle of the link,
-//! A aperture of the link, h spacing along the link.
+//! A and A' aperture and limited aperture of the link, h spacing along the link.
 
 use std::ops::Range;
 

@@ -19,14 +19,12 @@
 //! Legend: a axes, nu kinematic viscosity, d signed distance, n unit normal, h spacing, eps
 //! half-width of the band, P pressure weight, A aperture, m open depth, M its integral.
 
-use std::ops::Add;
-
 use glam::DVec3;
 
 use super::Scheme;
 use super::geometry::aperture::{aperture, forcing_reach, open_depth, open_depth_integral};
-use super::geometry::{BandFaces, FaceRun, NarrowBandShapes, NeighbourGrain, load_all};
-use grainwake_simd::{Kernel, MAX_LANES, Scalar, Vector, dispatch};
+use super::geometry::{BandFaces, FaceRun, load_all};
+use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 /// Forcing of a face by one grain, or by several together.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,17 +45,6 @@ impl FaceForcing {
     }
 }
 
-impl Add for FaceForcing {
-    type Output = FaceForcing;
-    fn add(self, other: FaceForcing) -> FaceForcing {
-        FaceForcing {
-            strength: self.strength + other.strength,
-            closed_fraction: self.closed_fraction + other.closed_fraction,
-            solid_fraction: self.solid_fraction + other.solid_fraction,
-        }
-    }
-}
-
 /// Parameters of the forcing in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct ForcingParams {
@@ -67,7 +54,7 @@ pub struct ForcingParams {
     /// Spacing of the grid [m].
     pub spacing: DVec3,
     /// Kinematic viscosity times the step [m^2].
-    diffusion: f64,
+    pub diffusion: f64,
 }
 
 impl ForcingParams {
@@ -88,18 +75,6 @@ impl ForcingParams {
         }
     }
 
-    /// Forcing of a face at a distance and mean distance [m] from a surface with the unit `normal`.
-    pub fn of(&self, distances: [f64; 2], normal: DVec3) -> FaceForcing {
-        match self.scheme {
-            Scheme::Aperture => {
-                let mut forcing = FaceForcing::default();
-                dispatch(OneFace { params: self, distances, normal, forcing: &mut forcing });
-                forcing
-            }
-            Scheme::Paper => self.blend(distances[0], normal),
-        }
-    }
-
     /// Strength of the drag as numerator and positive denominator; closed and solid fraction.
     #[inline(always)]
     pub fn aperture_forcing<V: Vector>(
@@ -110,45 +85,25 @@ impl ForcingParams {
         let (spacing, eps) = (self.spacing.to_array(), self.eps);
         let [drag, depth] = drag(d, normal, spacing, eps);
         let open = pressure_weight(mean, normal, spacing, eps);
-        let strength = V::constant(self.diffusion) * drag;
-        // Zero beyond the reach of the forcing: a run may span such faces between two parts of a
-        // concave grain.
-        let outside = V::constant(forcing_reach(eps));
-        let strength = d.select_below(outside, strength, V::constant(0.0));
         let one = V::constant(1.0);
-        ([strength, depth], [one - open, one - aperture(d, eps)])
+        ([self.strength(d, drag), depth], [one - open, one - aperture(d, eps)])
+    }
+
+    /// Strength at the distances `d` [m] from the drag over viscosity; zero beyond the reach of the
+    /// forcing, since a run may span such faces between two parts of a concave grain.
+    #[inline(always)]
+    pub fn strength<V: Vector>(&self, d: V, drag: V) -> V {
+        let outside = V::constant(forcing_reach(self.eps));
+        d.select_below(outside, V::constant(self.diffusion) * drag, V::constant(0.0))
     }
 
     /// Forcing of the paper's scheme: the weight of the rigid velocity is the solid fraction of a
     /// cell cut by a plane.
-    fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
+    pub fn blend(&self, d: f64, normal: DVec3) -> FaceForcing {
         let width = normal.abs().dot(self.spacing);
         let solid_fraction = (0.5 - d / width).clamp(0.0, 1.0);
         let strength = solid_fraction / (1.0 - solid_fraction);
         FaceForcing { strength, ..FaceForcing::default() }
-    }
-}
-
-/// Evaluates one face with the instruction set in use, in which fused products are instructions.
-struct OneFace<'a> {
-    params: &'a ForcingParams,
-    distances: [f64; 2],
-    normal: DVec3,
-    forcing: &'a mut FaceForcing,
-}
-
-impl Kernel for OneFace<'_> {
-    type Number = f64;
-    #[inline(always)]
-    fn run<V: Vector<Number = f64>>(self) {
-        let normal = self.normal.to_array().map(Scalar);
-        let ([strength, depth], [closed_fraction, solid_fraction]) =
-            self.params.aperture_forcing(self.distances.map(Scalar), normal);
-        *self.forcing = FaceForcing {
-            strength: strength.0 / depth.0,
-            closed_fraction: closed_fraction.0,
-            solid_fraction: solid_fraction.0,
-        };
     }
 }
 
@@ -172,14 +127,8 @@ pub struct ForcedFaces {
 }
 
 impl ForcedFaces {
-    /// Computes the weights of the faces in `band`, which `neighbours` may force too.
-    pub fn compute_weights(
-        &mut self,
-        params: &ForcingParams,
-        band: &mut BandFaces,
-        neighbours: &[NeighbourGrain],
-        shapes: &NarrowBandShapes,
-    ) {
+    /// Computes the weights of the faces in `band` as if no other grain were near.
+    pub fn compute_weights(&mut self, params: &ForcingParams, band: &mut BandFaces) {
         let count = band.count();
         let padded = band.pad(params.eps);
         self.weight.resize(padded, 0.0);
@@ -190,7 +139,7 @@ impl ForcedFaces {
             Scheme::Paper => {
                 for entry in 0..count {
                     let (distances, normal) = band.face(entry);
-                    let forcing = params.of(distances, normal);
+                    let forcing = params.blend(distances[0], normal);
                     self.weight[entry] = forcing.weight(forcing) as f32;
                     self.closed_fraction[entry] = forcing.closed_fraction as f32;
                     self.solid_fraction[entry] = forcing.solid_fraction as f32;
@@ -202,44 +151,6 @@ impl ForcedFaces {
             list.resize(count + MAX_LANES, 0.0);
         }
         self.total_closed_fraction.clear();
-        if !band.shared.is_empty() {
-            self.total_closed_fraction.extend_from_slice(&self.closed_fraction);
-            self.share_faces(params, band, neighbours, shapes);
-        }
-    }
-
-    /// Divides the forcing of shared faces among the grains, in proportion to their strengths.
-    fn share_faces(
-        &mut self,
-        params: &ForcingParams,
-        band: &BandFaces,
-        neighbours: &[NeighbourGrain],
-        shapes: &NarrowBandShapes,
-    ) {
-        let limit = forcing_reach(params.eps);
-        for &(entry, x) in &band.shared {
-            let (distances, normal) = band.face(entry);
-            if params.scheme == Scheme::Aperture && distances[0] <= -params.eps {
-                // A face deep inside a grain takes the velocity of this grain alone.
-                continue;
-            }
-            let forcing = params.of(distances, normal);
-            let mut all = forcing;
-            for other in neighbours {
-                let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
-                if d < limit {
-                    let normal = other.pose.orientation * gradient.normalize_or_zero();
-                    let mean = other.mean_distance(shapes, x, d);
-                    all = all + params.of([d, mean], normal);
-                }
-            }
-            self.weight[entry] = forcing.weight(all) as f32;
-            self.closed_fraction[entry] =
-                (forcing.closed_fraction / all.closed_fraction.max(1.0)) as f32;
-            self.solid_fraction[entry] =
-                (forcing.solid_fraction / all.solid_fraction.max(1.0)) as f32;
-            self.total_closed_fraction[entry] = all.closed_fraction.min(1.0) as f32;
-        }
     }
 
     /// Fraction of each face that all grains together close, 0 to 1.
@@ -310,9 +221,18 @@ pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
 /// Pressure weight P, 0 to 1, of faces at distances `d` [m] with unit normals `n`.
 #[inline(always)]
 pub fn pressure_weight<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> V {
-    let [numerator, depth] = drag(d, n, spacing, eps);
-    let integral = open_depth_integral(d, eps);
-    let driven = laplacian::<V, Parabola>(d, n, spacing, eps, integral);
+    let driven = parabola(d, n, spacing, eps);
+    pressure_weight_of(d, eps, drag(d, n, spacing, eps), driven)
+}
+
+/// Pressure weight from L m, m, L M and M.
+#[inline(always)]
+pub fn pressure_weight_of<V: Vector>(
+    d: V,
+    eps: f64,
+    [numerator, depth]: [V; 2],
+    [driven, integral]: [V; 2],
+) -> V {
     // M / m grows from 0.2 to 0.283 times d + eps; the bound holds where rounding is larger than M.
     let bound = V::constant(0.3) * (d + V::constant(eps)).max(V::constant(0.0));
     let mean_depth = integral.div(depth);
@@ -321,6 +241,13 @@ pub fn pressure_weight<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) 
     let weight = driven - numerator * mean_depth;
     let weight = weight.max(V::constant(0.0)).min(V::constant(1.0));
     d.select_below(outside, weight, V::constant(1.0))
+}
+
+/// L M and M [m^2] at distances `d` [m] from walls with unit normals `n`.
+#[inline(always)]
+pub fn parabola<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
+    let integral = open_depth_integral(d, eps);
+    [laplacian::<V, Parabola>(d, n, spacing, eps, integral), integral]
 }
 
 /// Velocity profile over a plane wall. A trait, because a closure would not be inlined in a kernel.
@@ -366,6 +293,7 @@ fn laplacian<V: Vector, P: Profile>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64
 mod tests {
     use super::*;
     use crate::immersed::geometry::aperture::reference;
+    use grainwake_simd::Scalar;
 
     /// Laplacian of `f(d)` at a plane's distance `d` by explicit differences of the positions.
     fn laplacian(f: impl Fn(f64) -> f64, d: f64, n: DVec3, h: f64) -> f64 {

@@ -8,7 +8,8 @@
 //! | layer | task | data it makes |
 //! |---|---|---|
 //! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
-//! | `forcing`, `rigidity` | weights of faces; impulse, rigid velocity | `ForcedFaces`, `Impulse` |
+//! | `forcing`, `shared_faces` | weights of faces, next to one and several grains | `ForcedFaces` |
+//! | `rigidity` | impulse, rigid velocity | `Impulse` |
 //! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
 //! | `emerged` | part of a grain beyond a free surface | `EmergedPart` |
 //! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
@@ -25,7 +26,7 @@
 //! 2. `geometry/mod.rs` lists the faces near the new pose. `geometry/distances.rs` evaluates their
 //!    signed distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
 //! 3. `forcing.rs` computes the weights of the forced faces: the drag, and the weight P of the
-//!    pressure gradient.
+//!    pressure gradient; `shared_faces.rs` those next to several grains.
 //! 4. `rigidity.rs` sums the impulse J on the fluid as an affine function of the six new
 //!    velocities of the grain. The impulse on the grain is -J.
 //! 5. `rigid_body.rs` solves for these velocities, contact load included.
@@ -50,6 +51,7 @@ mod reference;
 mod rigid_body;
 mod rigidity;
 mod schedule;
+mod shared_faces;
 #[cfg(test)]
 mod tests;
 mod update;
@@ -135,7 +137,8 @@ impl<R: Real> ImmersedGrains<R> {
         let params = self.forcing_params(dt);
         let (locator, scratch) = (&self.locator, &self.scratch);
         let each = self.grains.par_iter_mut().enumerate();
-        each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
+        each.for_each(|(index, ImmersedGrain { body, forced, located_for, .. })| {
+            *located_for = None;
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
             locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
         });

@@ -34,8 +34,9 @@ pub enum Crossing {
     Inside,
     /// A part of the grain is beyond a free surface.
     Emerged(Box<EmergedPart>),
-    /// The grain is about to leave and moves under its last hydrodynamic load.
-    Departing,
+    /// The grain is about to leave and moves under its last hydrodynamic load; with its part beyond
+    /// a free surface, if there is one.
+    Departing(Option<Box<EmergedPart>>),
     /// The grain has left the box.
     Left,
 }
@@ -109,12 +110,14 @@ impl OpenSides {
     }
 
     /// Extrapolates the accelerations in `previous` of emerged grains to the step about to be
-    /// taken. With the last acceleration the virtual mass would add energy to the heave.
+    /// taken. With the last acceleration the virtual mass would add energy to the heave. The
+    /// acceleration of a step with an impact counts as zero and is not extrapolated.
     pub fn extrapolate_accelerations(&mut self, previous: &mut [PreviousStep]) {
         let all = previous.iter_mut().zip(&mut self.earlier_accelerations).zip(&self.crossings);
         for ((previous, earlier), crossing) in all {
             let last = std::mem::replace(earlier, previous.acceleration);
-            if let Crossing::Emerged(_) = crossing {
+            let impact = [last, previous.acceleration].contains(&RigidVelocity::default());
+            if let (Crossing::Emerged(_), false) = (crossing, impact) {
                 previous.acceleration = previous.acceleration + (previous.acceleration - last);
             }
         }
@@ -124,7 +127,7 @@ impl OpenSides {
         if grain.has_left() {
             return Crossing::Left;
         }
-        let mut crossing = Crossing::Inside;
+        let (mut departing, mut emerged) = (false, None);
         for &(side, boundary) in &self.sides {
             let margin = MARGIN * self.mesh.spacing[side.axis];
             let coordinate = side.coordinate(&self.mesh);
@@ -138,22 +141,26 @@ impl OpenSides {
                 (range.0.min(x), range.1.max(x))
             });
             if boundary == Boundary::FreeSurface {
-                if highest > 0.0 && !matches!(crossing, Crossing::Departing) {
+                if highest > 0.0 {
                     let direction = (side.axis, side.outward());
                     let spacing = self.mesh.spacing[side.axis];
                     let subvolumes = &self.subvolumes[index];
                     // Buoyancy at the start of the step would add energy to the heave.
                     let middle = grain.rigid_velocity().advance(grain.pose, 0.5 * dt);
                     let part = EmergedPart::new(subvolumes, middle, direction, coordinate, spacing);
-                    crossing = Crossing::Emerged(Box::new(part));
+                    emerged = Some(Box::new(part));
                 }
             } else if lowest > 0.0 {
                 return Crossing::Left;
-            } else if highest > -margin {
-                crossing = Crossing::Departing;
+            } else {
+                departing |= highest > -margin;
             }
         }
-        crossing
+        match emerged {
+            _ if departing => Crossing::Departing(emerged),
+            Some(part) => Crossing::Emerged(part),
+            None => Crossing::Inside,
+        }
     }
 
     /// Outward speed [m/s] of the fastest grain close to each side, by axis and side. The flow
@@ -201,6 +208,9 @@ impl OpenSides {
         let (mesh, centre) = (self.mesh, grain.pose.position);
         let axes = [(side.axis + 1) % 3, (side.axis + 2) % 3];
         let [a, b] = axes.map(|axis| {
+            if !mesh.is_resolved(axis) {
+                return 0..=0;
+            }
             let cell = |x: f64| ((x - mesh.origin[axis]) / mesh.spacing[axis]).floor() as i64;
             let radius = grain.shape.bounding_radius();
             cell(centre[axis] - radius)..=cell(centre[axis] + radius)
@@ -267,13 +277,60 @@ impl Crossing {
         let force = gravity * (grain.density - fluid_density) * grain.shape.volume();
         let submerged = Load { force, torque: DVec3::ZERO };
         match self {
-            Crossing::Inside | Crossing::Departing => submerged,
+            Crossing::Inside | Crossing::Departing(None) => submerged,
             Crossing::Left => Load::default(),
-            Crossing::Emerged(part) => {
+            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => {
                 let weight = fluid_density * gravity;
                 let lost = Load { force: part.volume * weight, torque: part.moment.cross(weight) };
                 submerged + lost
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grainwake_shape::Shape;
+
+    #[test]
+    fn a_face_of_a_flat_box_is_covered_once() {
+        let mesh = Mesh::cubic([32, 1, 32], 0.125);
+        let boundaries = Boundaries([
+            [Boundary::WALL; 2],
+            [Boundary::Periodic; 2],
+            [Boundary::WALL, Boundary::FreeSurface],
+        ]);
+        let position = DVec3::new(2.0, 0.0625, 3.9);
+        let mut grains = [Grain::new(Shape::sphere(0.5, 600), 0.5).with_position(position)];
+        let mut sides = OpenSides::new(&mesh, &boundaries, &grains).expect("an open side");
+        sides.update(&mut grains, 0.01);
+        sides.list_covered_faces(&grains);
+        let mut faces: Vec<_> = sides.faces.iter().map(|face| face.face.indices).collect();
+        let count = faces.len();
+        faces.sort_unstable();
+        faces.dedup();
+        assert_eq!(faces.len(), count);
+        assert!((8..=9).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn an_impact_in_a_free_surface_is_not_extrapolated() {
+        let mesh = Mesh::cubic([32; 3], 0.125);
+        let mut boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
+        boundaries.0[2][1] = Boundary::FreeSurface;
+        let position = DVec3::new(2.0, 2.0, 3.9);
+        let mut grains = [Grain::new(Shape::sphere(0.5, 600), 0.5).with_position(position)];
+        let mut sides = OpenSides::new(&mesh, &boundaries, &grains).expect("an open side");
+        sides.update(&mut grains, 0.01);
+        let mut extrapolated = Vec::new();
+        // Accelerations of four steps; the second is one with an impact.
+        for acceleration in [3.0, 0.0, 2.0, 2.5] {
+            let mut previous = [PreviousStep::default()];
+            previous[0].acceleration.linear.z = acceleration;
+            sides.extrapolate_accelerations(&mut previous);
+            extrapolated.push(previous[0].acceleration.linear.z);
+        }
+        assert_eq!(extrapolated, [3.0, 0.0, 2.0, 3.0]);
     }
 }

@@ -24,7 +24,7 @@ pub struct PreviousStep {
     /// Velocities at the start of the step.
     pub velocity: RigidVelocity,
     /// Mean acceleration over the previous step [m/s^2, rad/s^2], without `added_mass_uptake`; zero
-    /// after contact.
+    /// after contact, and extrapolated to the next step for a grain in a free surface.
     pub acceleration: RigidVelocity,
     /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
     /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
@@ -290,8 +290,9 @@ impl VirtualMass {
     ) -> VirtualMass {
         let density_ratio = grain.density / fluid_density;
         let part = ((1.0 - density_ratio) / (1.0 - FULL_BELOW)).clamp(0.0, 1.0);
+        let part = if in_free_surface { 1.0 } else { part };
         // Virtual mass over the mass of the grain.
-        let part = if in_free_surface { 1.0 } else { part } / density_ratio;
+        let part = part / density_ratio;
         let free = |constraint: MotionConstraint| {
             if constraint == MotionConstraint::Free { part } else { 0.0 }
         };

@@ -140,7 +140,7 @@ impl<R: Real> ImmersedGrains<R> {
             let last = immersed[index].body.position;
             grains[index].pose.position.distance(last)
         };
-        // A grain that crossed a periodic edge has its last faces elsewhere.
+        // A caller may have wrapped a grain into the box: its last faces are elsewhere.
         let stayed = |index: usize| displacement(index) <= reach;
         // The margin covers the rounding of distances, which are in single precision.
         let margin = 0.01 * reach;

@@ -7,14 +7,15 @@ use std::sync::Mutex;
 
 use super::advection::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
 use super::forcing::{ForcedFaces, ForcingParams};
-use super::geometry::{LocateScratch, LocatedBody, Locator};
+use super::geometry::{LocateScratch, LocatedBody, Locator, NeighbourGrain};
 use super::open_sides::Crossing;
 use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{add_rigid_gain, sum_impulse};
+use super::shared_faces::share_faces;
 use crate::dem::{Grain, GrainKinematics};
 use crate::flow::{OldState, Prediction};
 use crate::grid::BorrowedRow;
-use crate::math::{Load, Real, RigidVelocity};
+use crate::math::{Load, Pose, Real, RigidVelocity};
 
 /// Lists of the faces near one grain, kept from one step to the next.
 #[derive(Default)]
@@ -25,6 +26,17 @@ pub struct ImmersedGrain {
     pub forced: ForcedFaces,
     /// Correction of the advection; unused while the grain is isolated.
     pub correction: AdvectionCorrection,
+    /// Pose, neighbours and step for which the other lists were made.
+    pub located_for: Option<LocatedFor>,
+}
+
+/// Values on which the lists of a grain depend. While they stay the same, as in a fixed bed, the
+/// grain is not located again.
+#[derive(PartialEq)]
+pub struct LocatedFor {
+    pose: Pose,
+    neighbours: Vec<NeighbourGrain>,
+    dt: f64,
 }
 
 impl ImmersedGrain {
@@ -153,6 +165,7 @@ impl<R: Real> CouplingContext<'_, R> {
         scratch: &mut ThreadScratch<R>,
     ) {
         let ThreadScratch { advection, locate, correction, forced } = scratch;
+        grain.located_for = None;
         let body = &mut grain.body;
         if self.corrects_advection {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
@@ -184,7 +197,15 @@ impl<R: Real> CouplingContext<'_, R> {
         predictions: &[Prediction<R>; 3],
         scratch: &mut LocateScratch,
     ) {
-        self.locate(index, &mut grain.body, &mut grain.forced, scratch);
+        let now = LocatedFor {
+            pose: self.input.grains[index].pose,
+            neighbours: self.locator.neighbours(index).to_vec(),
+            dt: self.input.dt,
+        };
+        if grain.located_for.as_ref() != Some(&now) {
+            self.locate(index, &mut grain.body, &mut grain.forced, scratch);
+            grain.located_for = Some(now);
+        }
         update.system = self.assemble(index, predictions, &mut grain.forced);
     }
 
@@ -212,7 +233,7 @@ impl<R: Real> CouplingContext<'_, R> {
         let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
         let surface = match self.input.crossings.get(index) {
-            Some(Crossing::Departing) => {
+            Some(Crossing::Departing(_)) => {
                 let loads = [applied, self.input.last_loads[index]];
                 return RigidBodySystem::departing(grain, previous, impulse, loads, dt);
             }
@@ -241,8 +262,8 @@ pub fn locate_and_compute_weights(
         return;
     }
     locator.locate(index, grain, body, &mut forced.runs, scratch);
-    let neighbours = locator.neighbours(index);
-    forced.compute_weights(params, &mut scratch.band, neighbours, locator.shapes());
+    forced.compute_weights(params, &mut scratch.band);
+    share_faces(params, &scratch.band, locator.neighbours(index), locator.shapes(), forced);
 }
 
 /// Pool of idle buffers, kept from one step to the next. It grows to the largest number of threads

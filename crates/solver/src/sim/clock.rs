@@ -18,11 +18,15 @@ pub(super) struct Clock {
     first_step: f64,
 }
 
-/// Largest ratio of successive steps: Adams-Bashforth extrapolates over the previous step.
+/// Largest ratio of successive steps, since Adams-Bashforth extrapolates over the previous step;
+/// with one step fewer to the next output the ratio is up to 2.
 const MAX_GROWTH: f64 = 1.2;
 /// Fraction of the stability limit up to which one step fewer to the next output is taken; this
 /// hysteresis keeps the number of steps from alternating.
 const HYSTERESIS: f64 = 0.95;
+
+/// Relative difference of steps that is one of rounding.
+const ROUNDING: f64 = 1e-12;
 
 impl Clock {
     /// Clock at t = 0.
@@ -77,11 +81,13 @@ impl Clock {
         // MAX_GROWTH alone never reaches a fourth of an interval from a fifth.
         let fewer = horizon / (count - 1.0);
         let as_before = self.last_step * count >= horizon * (1.0 - 1e-9);
-        if count > 1.0 && as_before && fewer <= HYSTERESIS * largest {
+        let step = if count > 1.0 && as_before && fewer <= HYSTERESIS * largest {
             fewer
         } else {
             horizon / count
-        }
+        };
+        // Steps of one length are bitwise identical: what depends on the length can be kept.
+        if (step - self.last_step).abs() <= ROUNDING * step { self.last_step } else { step }
     }
 
     /// Advances the time by `step` [s].

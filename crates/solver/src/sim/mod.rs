@@ -22,7 +22,8 @@ mod timing;
 use glam::DVec3;
 
 use crate::dem::{
-    Contact, ContactDynamics, Grain, GrainKinematics, GrainResponse, RelativeOverlap, RigidState,
+    Contact, ContactDynamics, ContactParams, Grain, GrainKinematics, GrainResponse,
+    RelativeOverlap, RigidState,
 };
 use crate::grid::Mesh;
 use crate::immersed::{OpenSides, PreviousStep};
@@ -110,11 +111,14 @@ impl Simulation {
     pub fn new(mut setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
         (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
-        let enclosure = setup.enclosure();
+        // With fluid the equations of the grains contain the damping (`Start::prepare`).
+        let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
+        let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
+        let dynamics = ContactDynamics::new(contact, setup.enclosure());
         let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
         let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
         Ok(Simulation {
-            dynamics: ContactDynamics::new(setup.contact, enclosure),
+            dynamics,
             open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, &setup.grains),
             clock: Clock::new(&setup),
             loads: vec![Load::default(); setup.grains.len()],

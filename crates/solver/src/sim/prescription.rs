@@ -35,6 +35,9 @@ impl Prescription {
         self.set_velocities(grains, time);
         for motion in &self.motions {
             let grain = &mut grains[motion.grain];
+            if grain.has_left() {
+                continue;
+            }
             if motion.velocity.is_some() {
                 grain.translation = MotionConstraint::Prescribed(grain.velocity);
             }
@@ -48,6 +51,9 @@ impl Prescription {
     pub(super) fn set_velocities(&self, grains: &mut [Grain], time: f64) {
         for motion in &self.motions {
             let grain = &mut grains[motion.grain];
+            if grain.has_left() {
+                continue;
+            }
             if let Some(formula) = &motion.velocity {
                 grain.velocity = formula.at(&[time]);
             }

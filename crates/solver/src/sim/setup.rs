@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dem::{ContactParams, Enclosure, Grain};
+use crate::dem::{ContactParams, Enclosure, Grain, Side};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::Scheme;
@@ -13,7 +13,7 @@ use super::Prescription;
 /// Rule for the length of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepRule {
-    /// Constant step [s].
+    /// Constant step [s], shortened so that steps end at the output times.
     Fixed(f64),
     /// Largest step within all limits; the default has CFL number 0.4 and viscous number 0.2.
     Limits {
@@ -140,11 +140,21 @@ impl Setup {
 
     /// Walls and periodic axes of the box for contact.
     pub fn enclosure(&self) -> Enclosure {
+        Setup::enclosure_of(&self.mesh, &self.boundaries)
+    }
+
+    /// Walls and periodic axes of a box with this mesh and these boundaries for contact.
+    pub fn enclosure_of(mesh: &Mesh, boundaries: &Boundaries) -> Enclosure {
+        let side = |boundary: Boundary| match boundary {
+            Boundary::Wall { velocity } => Side::Wall { velocity },
+            Boundary::Slip => Side::Frictionless,
+            _ => Side::Open,
+        };
         Enclosure {
-            lower: self.mesh.origin,
-            upper: self.mesh.upper(),
-            periodic: self.boundaries.periodic(),
-            solid: self.boundaries.0.map(|sides| sides.map(|boundary| boundary.is_solid())),
+            lower: mesh.origin,
+            upper: mesh.upper(),
+            periodic: boundaries.periodic(),
+            sides: boundaries.0.map(|sides| sides.map(side)),
         }
     }
 

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use super::Simulation;
-use crate::dem::{ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, outside};
+use crate::dem::{
+    ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, Side, outside,
+};
 
 /// Overlap for which a stiffness is suggested [smaller equivalent diameters].
 const SUGGESTED_OVERLAP: f64 = 0.01;
@@ -168,7 +170,7 @@ impl Simulation {
     pub fn with_cause(&self, symptom: String, otherwise: Remedy) -> (String, Remedy) {
         let enclosure = self.setup.enclosure();
         let present = |o: &Outside| !self.setup.grains[o.grain].has_left();
-        let open = |o: &Outside| present(o) && !enclosure.solid[o.axis][o.side];
+        let open = |o: &Outside| present(o) && enclosure.sides[o.axis][o.side] == Side::Open;
         match outside(&self.setup.grains, &enclosure).into_iter().find(open) {
             Some(Outside { grain, axis, side, .. }) => {
                 let (side, axis) = (["lower", "upper"][side], ["x", "y", "z"][axis]);

@@ -111,7 +111,7 @@ impl<'a> Start<'a> {
                 solid.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
             data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
-            if let Crossing::Departing = crossing {
+            if let Crossing::Departing(_) = crossing {
                 // Departing grains move under their last load: no added mass takes up a velocity.
                 data.previous[i].pending_added_mass_velocity = RigidVelocity::default();
             }
@@ -120,6 +120,9 @@ impl<'a> Start<'a> {
             } else if !data.external[i].is_zero() {
                 // A zero load is not added: it would turn -0.0 into 0.0.
                 data.applied[i] += data.external[i];
+            }
+            if setup.fluid.is_some() && setup.contact.global_damping > 0.0 {
+                data.applied[i] += damping_load(grain, setup.contact.global_damping, dt);
             }
         }
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
@@ -315,6 +318,16 @@ impl Projected<'_> {
             };
         }
         *flow.momentum_residual = residual;
+    }
+}
+
+/// Load of the global damping xi [1/s] (Eqs 6 and 24) that gives the velocities of Eq. 22 after
+/// `dt` [s].
+fn damping_load(grain: &Grain, xi: f64, dt: f64) -> Load {
+    let rate = -xi / (1.0 + 0.5 * xi * dt);
+    Load {
+        force: rate * grain.mass() * grain.velocity,
+        torque: rate * (grain.inertia() * grain.angular_velocity),
     }
 }
 

@@ -78,6 +78,9 @@ impl Simulation {
             check_pose(&grain.pose, &self.setup.mesh)?;
             grain.velocity = input.vector()?;
             grain.angular_velocity = input.vector()?;
+            if grain.has_left() {
+                grain.leave();
+            }
             *load = Load { force: input.vector()?, torque: input.vector()? };
             let pending = &mut previous.pending_added_mass_velocity;
             for rates in [&mut previous.acceleration, pending, &mut previous.added_mass_uptake] {

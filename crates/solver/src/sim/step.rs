@@ -22,10 +22,14 @@ impl Simulation {
     /// [`StepRule`](super::StepRule) and such that a whole number of equal steps ends `horizon` [s]
     /// from now, which makes output times exact; an infinite horizon imposes no such condition.
     ///
+    /// # Panics
+    /// If `horizon` is not positive.
+    ///
     /// # Errors
     /// [`StepError::Unstable`] if the state is no longer finite or the CFL number has jumped; the
     /// simulation cannot be continued from such a state.
     pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {
+        assert!(horizon > 0.0, "a step ends after the present time, not {horizon} s from it");
         let rate = (self.fluid.as_ref()).map_or(0.0, |fluid| fluid.measures().max_rate);
         let dt = self.clock.next_step(rate, horizon);
         match Start::prepare(self, dt) {
@@ -34,12 +38,13 @@ impl Simulation {
                 let predicted = start.predict();
                 // Contact sub-steps (Eqs 6 to 36) under the last hydrodynamic load.
                 let moved = predicted.move_grains();
-                // Faces forced at the new poses; Eqs 4 and 5 as a 6 x 6 system of each grain.
+                // Faces forced at the new poses; Eqs 4 and 5 as a 6 x 6 system of each grain,
+                // solved at once for isolated grains.
                 let coupled = moved.couple();
                 // The sub-steps again, with the 6 x 6 mass of grain and fluid, if a contact load
                 // acts or acted in the last step (decisions 0014, 0022).
                 let resolved = coupled.resolve_contact();
-                // New velocities of the grains on the forced faces (Eq. 4), loads (Eq. 5).
+                // New velocities of the other grains on the forced faces (Eq. 4), loads (Eq. 5).
                 let rigid = resolved.impose_rigidity();
                 // Poisson solve: velocity without divergence (Eq. 1a), and pressure.
                 let projected = rigid.project();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
-use grainwake_solver::dem::{ContactDynamics, ContactParams, Enclosure, Grain};
+use grainwake_solver::dem::{ContactDynamics, ContactParams, Enclosure, Grain, Side};
 use grainwake_solver::math::Load;
 
 /// A sphere at rest.
@@ -23,7 +23,7 @@ pub fn open_box(half: f64) -> Enclosure {
         lower: DVec3::splat(-half),
         upper: DVec3::splat(half),
         periodic: [false; 3],
-        solid: [[false; 2]; 3],
+        sides: Default::default(),
     }
 }
 
@@ -33,7 +33,7 @@ pub fn floor() -> Enclosure {
         lower: DVec3::new(-10.0, -10.0, 0.0),
         upper: DVec3::splat(10.0),
         periodic: [false; 3],
-        solid: [[false; 2], [false; 2], [true, false]],
+        sides: [[Side::Open; 2], [Side::Open; 2], [Side::WALL, Side::Open]],
     }
 }
 

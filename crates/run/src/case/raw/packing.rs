@@ -4,6 +4,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::grain::RawShape;
+use super::motion::RawMotion;
 use crate::case::located::Located;
 use crate::case::notation::{Notation, Unsupported, notations};
 use crate::case::quantity::{Density, Length, Number, Quantity, Triple, Velocity};
@@ -44,6 +45,9 @@ pub struct RawPacking {
     /// Velocity at the start [m/s].
     #[serde(default)]
     pub velocity: Located<Triple<Velocity>>,
+    /// Motion of all grains, as for `[[grain]]`.
+    #[serde(default)]
+    pub motion: Located<RawMotion>,
     /// Seed of the random numbers.
     #[serde(default)]
     pub seed: u64,

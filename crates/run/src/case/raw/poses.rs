@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::grain::RawShape;
+use super::motion::RawMotion;
 use crate::case::located::Located;
 use crate::case::quantity::{Density, Length, Quantity, Time, Triple};
 
@@ -40,4 +41,7 @@ pub struct RawPoses {
     /// Density [kg/m3]: with `file`, unless the table gives it; with `run`, instead of that of the
     /// run.
     pub density: Option<Located<Quantity<Density>>>,
+    /// Motion of all grains, as for `[[grain]]`: "fixed" makes a fixed bed of a settled heap. With
+    /// `run`, instead of that of the run.
+    pub motion: Option<Located<RawMotion>>,
 }

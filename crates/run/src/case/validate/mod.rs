@@ -26,8 +26,8 @@ use super::raw::{RawCase, RawPlane};
 use super::shapes::{Library, ShapeFile};
 use super::source::Source;
 use crate::RunPlan;
-use grainwake_solver::dem::{Enclosure, Grain};
-use grainwake_solver::sim::{Prescription, Setup};
+use grainwake_solver::dem::Grain;
+use grainwake_solver::sim::{PrescribedMotion, Prescription, Setup};
 
 /// Validated parts of a case.
 pub(super) struct Validated {
@@ -76,14 +76,9 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     }
     let (mesh, boundaries) = (mesh?, boundaries?);
     if let Some(fluid) = &raw.fluid {
-        physics::formulas(check, fluid, &prescription, &mesh);
+        physics::formulas(check, fluid, &prescription, &mesh, raw.time.end.si);
     }
-    let enclosure = Enclosure {
-        lower: mesh.origin,
-        upper: mesh.upper(),
-        periodic: boundaries.periodic(),
-        solid: boundaries.0.map(|sides| sides.map(|b| b.is_solid())),
-    };
+    let enclosure = Setup::enclosure_of(&mesh, &boundaries);
     let before_packings = check.problems.len();
     for raw_poses in &raw.poses {
         let law = raw.contact.law.value;
@@ -107,6 +102,13 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         return None;
     }
     let motions = grains.prescribed_motions();
+    for PrescribedMotion { grain, velocity, angular_velocity } in &motions {
+        let span = &grains.resolved[*grain].motion.span;
+        for formula in [velocity, angular_velocity].into_iter().flatten() {
+            let end = raw.time.end.si;
+            physics::finite_over_time(check, span, end, |time| Some(formula.at(&[time])));
+        }
+    }
     let Grains { library, vertical, built, resolved, placements } = grains;
     let mut grains = built.into_iter().collect::<Option<Vec<Grain>>>()?;
     prescription.motions = motions;

@@ -6,7 +6,7 @@ use crate::case::located::Located;
 use crate::case::packing::{Random, Region, Sphere, orientation};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
-    Arrangement, Bounds, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
+    Arrangement, Bounds, MotionLaw, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
 use crate::number_format::vector;
 use grainwake_solver::dem::Enclosure;
@@ -39,7 +39,9 @@ pub(super) fn packing(
     let clearance = check.not_negative(&raw.clearance);
     density?;
     let (jitter, clearance) = (jitter?, clearance?);
-    not_too_light(check, &raw.density, fluid_density);
+    if raw.motion.velocity == MotionLaw::Free {
+        not_too_light(check, &raw.density, fluid_density);
+    }
     let mut random = Random::seed_from_u64(raw.seed);
     let (mut packed, radii) = members(check, grains, raw, &mut random)?;
 
@@ -107,7 +109,8 @@ fn members(
         let kind = n % (files + raw.shapes.len());
         let mut grain = RawGrain {
             density: raw.density.clone(),
-            velocity: Some(raw.velocity.clone()),
+            velocity: (raw.motion.velocity == MotionLaw::Free).then(|| raw.velocity.clone()),
+            motion: raw.motion.clone(),
             file: raw.files.get(kind).cloned(),
             ..RawGrain::default()
         };

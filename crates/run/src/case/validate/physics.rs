@@ -8,7 +8,7 @@ use crate::case::located::{Located, Span};
 use crate::case::quantity::{Number, Quantity};
 use crate::case::raw::{RawContact, RawFluid};
 use crate::case::settling::{impact_speed, smallest_diameter};
-use crate::number_format::length;
+use crate::number_format::{length, quantity};
 use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, Material};
 use grainwake_solver::flow::FluidParams;
 use grainwake_solver::grid::Mesh;
@@ -82,19 +82,41 @@ pub(super) fn fluid(
 }
 
 /// Refuses formulas of the fluid without a finite value.
-pub(super) fn formulas(check: &mut Checker, raw: &RawFluid, given: &Prescription, mesh: &Mesh) {
-    let mut refuse = |undefined: bool, span: &Span, place: &str| {
-        if undefined {
-            let message = format!("the formula does not give a finite number {place}");
-            let help = "avoid divisions by zero and roots or logarithms of negative numbers";
-            check.fail(span, message, help);
-        }
-    };
-    let speed = given.initial_speed(mesh);
-    let everywhere = "everywhere in the box";
-    refuse(speed.is_some_and(f64::is_nan), &raw.initial_velocity.span, everywhere);
-    let acceleration = given.body_acceleration(0.0);
-    refuse(acceleration.is_some_and(DVec3::is_nan), &raw.body_acceleration.span, "at t = 0");
+pub(super) fn formulas(
+    check: &mut Checker,
+    raw: &RawFluid,
+    given: &Prescription,
+    mesh: &Mesh,
+    end: f64,
+) {
+    if given.initial_speed(mesh).is_some_and(f64::is_nan) {
+        refuse_formula(check, &raw.initial_velocity.span, "everywhere in the box");
+    }
+    let acceleration = |time| given.body_acceleration(time);
+    finite_over_time(check, &raw.body_acceleration.span, end, acceleration);
+}
+
+/// Refuses a formula of time that is not finite at one of a thousand times from 0 to `end` [s].
+pub(super) fn finite_over_time(
+    check: &mut Checker,
+    span: &Span,
+    end: f64,
+    formula: impl Fn(f64) -> Option<DVec3>,
+) {
+    const TIMES: u32 = 1000;
+    let end = if end.is_finite() { end } else { 0.0 };
+    let mut times = (0..=TIMES).map(|n| end * f64::from(n) / f64::from(TIMES));
+    let undefined = |time: &f64| formula(*time).is_some_and(|value| !value.is_finite());
+    if let Some(time) = times.find(undefined) {
+        let time = if time == 0.0 { "0".into() } else { quantity(time, "s") };
+        refuse_formula(check, span, &format!("at t = {time}"));
+    }
+}
+
+fn refuse_formula(check: &mut Checker, span: &Span, place: &str) {
+    let message = format!("the formula does not give a finite number {place}");
+    let help = "avoid divisions by zero and roots or logarithms of negative numbers";
+    check.fail(span, message, help);
 }
 
 /// Returns the contact parameters. A stiffness that is not given follows from the largest overlap.

@@ -58,6 +58,9 @@ pub(super) fn poses(
         grain.orientation = Orientation::Quaternion(pose.orientation).into();
         grain.rotate = Turns::default();
         grain.gap_above = None;
+        if let Some(motion) = &raw.motion {
+            grain.motion = motion.clone();
+        }
         // A prescribed motion decides the velocity at the start.
         let velocity = if raw.velocities { pose.velocity } else { DVec3::ZERO };
         let spin = if raw.velocities { pose.angular_velocity } else { DVec3::ZERO };

@@ -10,7 +10,7 @@ use crate::case::expect::{Expectation, Measure};
 use crate::case::settling::{is_free, time_step};
 use crate::number_format::{AXES, SIDES, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
-use grainwake_solver::dem::{MotionConstraint, outside};
+use grainwake_solver::dem::{Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
@@ -34,6 +34,8 @@ pub(super) fn warnings(
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));
     found.extend(open_faces(setup));
+    found.extend(starts_next_to_open_face(setup));
+    found.extend(surface_against_gravity(setup));
     found.extend(unsupported_weight(setup));
     found.extend(prescribed_motions(setup, plan.end));
     found.extend(flat_box(setup));
@@ -81,6 +83,45 @@ fn open_faces(setup: &Setup) -> Vec<String> {
     found
 }
 
+/// Free surfaces that are not level: the flat lid is a surface at rest only across gravity.
+fn surface_against_gravity(setup: &Setup) -> Option<String> {
+    let mut sides = (0..6).map(|k| (k / 2, k % 2));
+    let tilted = |(axis, side): &(usize, usize)| {
+        let outward = if *side == 0 { -1.0 } else { 1.0 };
+        let up = -outward * setup.gravity.normalize_or_zero()[*axis];
+        let surface = setup.boundaries.0[*axis][*side] == Boundary::FreeSurface;
+        surface && setup.gravity != DVec3::ZERO && up < 0.999
+    };
+    let (axis, side) = sides.find(tilted)?;
+    Some(format!(
+        "gravity does not point straight into the fluid at the free surface on the {} side of {}: a real surface would not be flat and still there; turn gravity, or make the side a \"slip\" wall",
+        SIDES[side], AXES[axis]
+    ))
+}
+
+/// Grains that start so close to an inflow or outflow that they move under their last load, which
+/// is none.
+fn starts_next_to_open_face(setup: &Setup) -> Option<String> {
+    setup.fluid.as_ref()?;
+    let mesh = &setup.mesh;
+    let near = |grain: &Grain, axis: usize, side: usize| {
+        let open =
+            matches!(setup.boundaries.0[axis][side], Boundary::Inflow { .. } | Boundary::Outflow);
+        let face = [mesh.origin, mesh.upper()][side][axis];
+        let distance = (grain.pose.position[axis] - face).abs() - grain.shape.bounding_radius();
+        open && distance < 2.0 * mesh.spacing[axis]
+    };
+    let mut found = (0..setup.grains.len()).flat_map(|i| (0..6).map(move |k| (i, k / 2, k % 2)));
+    let (index, axis, side) = found.find(|(index, axis, side)| {
+        let grain = &setup.grains[*index];
+        is_free(grain) && near(grain, *axis, *side)
+    })?;
+    Some(format!(
+        "grain {index} starts within two cells of the open {} side of {}: it moves without drag until it is farther away; move it by two cells",
+        SIDES[side], AXES[axis]
+    ))
+}
+
 /// Boxes in which neither wall nor grain supports the weight.
 fn unsupported_weight(setup: &Setup) -> Option<String> {
     let fluid = setup.fluid.as_ref()?;
@@ -96,20 +137,18 @@ fn unsupported_weight(setup: &Setup) -> Option<String> {
     if setup.gravity == DVec3::ZERO || held || driven || (0..3).any(holds) {
         return None;
     }
-    let (mut weight, mut solid) = (0.0, 0.0);
-    for grain in &setup.grains {
-        weight += (grain.density - fluid.density) * grain.shape.volume();
-        solid += grain.shape.volume();
-    }
-    let open = setup.mesh.extent().element_product() - solid;
-    let balance = -weight / (fluid.density * open) * setup.gravity;
+    let excess = |grain: &Grain| (grain.density - fluid.density) * grain.shape.volume();
+    let weight: f64 = setup.grains.iter().map(excess).sum();
+    // The acceleration drives the displaced fluid too: a grain takes the pressure gradient.
+    let volume = setup.mesh.extent().element_product();
+    let balance = -weight / (fluid.density * volume) * setup.gravity;
     (weight != 0.0).then(|| {
         let balance = balance.to_array().map(|a| match a == 0.0 {
             true => "0".into(),
             false => format!("{a:.4e}"),
         });
         format!(
-            "no wall and no fixed grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it within a percent",
+            "no wall and no fixed grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it",
             balance.join(", ")
         )
     })
@@ -156,18 +195,29 @@ fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
     found
 }
 
-/// Free grains in a box that is one cell thick.
-fn flat_box(setup: &Setup) -> Option<String> {
-    setup.fluid.as_ref()?;
-    let axis = (0..3).find(|axis| setup.mesh.cells[*axis] == 1)?;
-    let mut free = setup.grains.iter().filter(|grain| is_free(grain));
-    free.next().map(|_| {
-        let name = AXES[axis];
-        format!(
+/// Grains in a box that is one cell thick: free ones, and those away from its middle.
+fn flat_box(setup: &Setup) -> Vec<String> {
+    let flat = (0..3).find(|axis| setup.mesh.cells[*axis] == 1);
+    let Some(axis) = flat.filter(|_| setup.fluid.is_some()) else { return Vec::new() };
+    let (mesh, name) = (&setup.mesh, AXES[axis]);
+    let depth = mesh.extent()[axis];
+    let mut found = Vec::new();
+    if setup.grains.iter().any(is_free) {
+        found.push(format!(
             "the box is one cell thick along {name}: the flow sees a grain as a body of the whole depth, {}, but its weight and inertia are those of its own shape; make it nearly as deep",
-            quantity(setup.mesh.extent()[axis], "m")
-        )
-    })
+            quantity(depth, "m")
+        ));
+    }
+    let middle = mesh.origin[axis] + 0.5 * depth;
+    let away = |grain: &Grain| (grain.pose.position[axis] - middle).abs() > 0.01 * depth;
+    if let Some(index) = setup.grains.iter().position(away) {
+        found.push(format!(
+            "the box is one cell thick along {name}: the flow sees the section of grain {index} at {name} = {}, in the middle of the box, but its centre is at {}; move it to the middle",
+            quantity(middle, "m"),
+            quantity(setup.grains[index].pose.position[axis], "m")
+        ));
+    }
+    found
 }
 
 /// Numbers that suggest a wrong unit.

@@ -30,6 +30,8 @@ pub(in crate::dem) struct PairProperties {
     pub damping_ratio: f64,
     /// Whether the partner is a wall.
     pub partner_is_wall: bool,
+    /// Whether the partner is a wall without friction.
+    pub frictionless: bool,
 }
 
 /// Properties of one body of a pair.
@@ -61,6 +63,7 @@ impl PairProperties {
             effective_shear_modulus: 1.0 / (a.tangential_compliance + b.tangential_compliance),
             damping_ratio: a.damping_ratio.max(b.damping_ratio),
             partner_is_wall: partner.is_none(),
+            frictionless: false,
         }
     }
 }
@@ -225,6 +228,7 @@ mod tests {
             effective_shear_modulus: 8e9,
             damping_ratio: 0.0,
             partner_is_wall: false,
+            frictionless: false,
         };
         let (mut overlap, mut speed, mut time, dt) = (0.0, 3.0, 0.0, 1e-9);
         let expected = HertzMindlin.contact_time(&pair, speed, 0.0);

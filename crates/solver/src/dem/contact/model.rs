@@ -102,10 +102,10 @@ impl ContactModel {
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
-            coefficient: if properties.partner_is_wall {
-                self.params.wall_friction
-            } else {
-                self.params.friction
+            coefficient: match properties {
+                PairProperties { frictionless: true, .. } => 0.0,
+                PairProperties { partner_is_wall: true, .. } => self.params.wall_friction,
+                _ => self.params.friction,
             },
             stiffness: at.tangential_stiffness,
             history_scale: history_scale(record.tangential_stiffness, at.tangential_stiffness),

@@ -9,7 +9,7 @@ use super::integrator::{EffectiveInertia, GrainResponse, HalfStepVelocity};
 use crate::dem::contact::{
     BodyProperties, ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties,
 };
-use crate::dem::enclosure::{Enclosure, PairKey, Partner};
+use crate::dem::enclosure::{Enclosure, PairKey, Partner, Side};
 use crate::dem::grain::Grain;
 use crate::dem::material::Material;
 use crate::dem::search::{NodeTree, PosedShape};
@@ -189,6 +189,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
         mid_step: [bodies[i].mid_step, RigidVelocity::default()],
         end_of_step: [bodies[i].end_of_step, RigidVelocity::default()],
     };
+    let mut properties = pair_properties(&record.key, bodies, context.wall);
     let closest = match record.key.partner {
         Partner::Grain(j) => {
             let image = IVec3::from(record.key.image).as_dvec3() * context.enclosure.period();
@@ -199,12 +200,16 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
             record.patch.find_grain_contact(&a, &b, reach)
         }
         Partner::Wall { axis, side } => {
-            let face = context.enclosure.plane(axis as usize, side as usize);
+            let (axis, side) = (axis as usize, side as usize);
+            let wall = context.enclosure.sides[axis][side];
+            let motion = RigidVelocity { linear: wall.velocity(), angular: DVec3::ZERO };
+            (pair.mid_step[1], pair.end_of_step[1]) = (motion, motion);
+            properties.frictionless = wall == Side::Frictionless;
+            let face = context.enclosure.plane(axis, side);
             let offset = face.distance(a.position);
             let patch = &mut record.patch;
             patch.find_wall_contact(&a, face.inward, offset, reach)
         }
     };
-    let properties = pair_properties(&record.key, bodies, context.wall);
     (context.model).evaluate(record, closest, &properties, &pair, context.step);
 }

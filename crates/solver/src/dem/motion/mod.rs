@@ -94,9 +94,8 @@ impl ContactDynamics {
     /// about the centroids) and contact; returns the number of sub-steps.
     ///
     /// `mean_contact` receives the impulse of contact and lubrication on each grain over `dt`, as a
-    /// mean load.
-    /// A missing load counts as zero. Positions are not wrapped into the box; a caller may wrap
-    /// them between steps.
+    /// mean load. Grains beyond the end of `loads` have none. Positions are not wrapped into the
+    /// box; a caller may wrap them between steps.
     pub fn advance(
         &mut self,
         grains: &mut [Grain],

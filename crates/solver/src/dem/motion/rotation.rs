@@ -98,8 +98,11 @@ pub fn rotate_by_cayley(orientation: DQuat, omega: DVec3, step: f64) -> DQuat {
 }
 
 /// Rotates an orientation over `step` [s] at a constant, prescribed angular velocity
-/// [rad/s, space frame], without time-step error.
+/// [rad/s, space frame], without time-step error. Without rotation no bit changes.
 pub fn rotate_exactly(orientation: DQuat, omega_space: DVec3, step: f64) -> DQuat {
+    if omega_space == DVec3::ZERO {
+        return orientation;
+    }
     (DQuat::from_scaled_axis(omega_space * step) * orientation).normalize()
 }
 

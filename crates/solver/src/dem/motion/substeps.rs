@@ -147,9 +147,9 @@ impl ContactDynamics {
     }
 
     /// Time in which no listed pair closes its lubrication film by more than half the height of the
-    /// asperities [s]; infinite without lubrication.
+    /// asperities [s]; infinite without lubrication or asperities.
     fn film_time(&self) -> f64 {
-        if self.model.range() <= 0.0 {
+        if self.model.range() <= 0.0 || self.model.params.roughness <= 0.0 {
             return f64::INFINITY;
         }
         let speeds = self.records.iter().map(|r| self.relative_speed(&r.key));

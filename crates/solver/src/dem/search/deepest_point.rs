@@ -8,7 +8,7 @@
 //! minima are used again until the surfaces have moved by a fraction of the overlap; then descents
 //! start from them, until another minimum may have become the deepest.
 
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
 use grainwake_shape::{Field, Shape};
 
 use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint, project_to_surface};
@@ -175,12 +175,16 @@ impl LocalMinima {
 /// Returns true for a sphere whose partner is a sphere or a wall: the distance then has a single
 /// minimum on its surface.
 fn has_one_minimum(surface: &Shape, partner: &PartnerField) -> bool {
-    let is_sphere = |shape: &Shape| matches!(shape.field(), Field::Sphere(_));
-    is_sphere(surface)
-        && match partner {
-            PartnerField::Shape { shape, .. } => is_sphere(shape),
-            PartnerField::HalfSpace { .. } => true,
-        }
+    let is_wall = matches!(partner, PartnerField::HalfSpace { .. });
+    is_sphere(surface) && (is_wall || partner_is_sphere(partner))
+}
+
+fn is_sphere(shape: &Shape) -> bool {
+    matches!(shape.field(), Field::Sphere(_))
+}
+
+fn partner_is_sphere(partner: &PartnerField) -> bool {
+    matches!(partner, PartnerField::Shape { shape, .. } if is_sphere(shape))
 }
 
 /// Limits of a descent.
@@ -258,38 +262,78 @@ fn steepest_descent(
     point
 }
 
+/// Number of points of a ring in the compass search.
+const DIRECTIONS: usize = 6;
+
 /// Compass search from `point`: six points around it in the tangent plane, at a radius that is
-/// halved from `first` to `last` [m] if none of them is closer.
+/// halved from `first` to `last` [m] if none of them is closer. If one of the two bodies is a
+/// sphere, the last ring gives the vertex of a paraboloid: the point of a sphere that rolls would
+/// otherwise be up to half a radius behind the deepest one, and the sphere would gain energy.
+/// Between two sampled surfaces the vertex would be that of their roughness.
 fn compass_search(
     surface: &Shape,
     partner: &PartnerField,
     mut point: SurfacePoint,
     [first, last]: [f64; 2],
 ) -> SurfacePoint {
-    const DIRECTIONS: usize = 6;
     const MAX_MOVES: usize = 40;
     let (_, gradient) = surface.distance_and_gradient(point.position);
     let (u, v) = gradient.normalize_or(DVec3::Z).any_orthonormal_pair();
-    let around: [DVec3; DIRECTIONS] = std::array::from_fn(|k| {
-        let (s, c) = (std::f64::consts::TAU * k as f64 / DIRECTIONS as f64).sin_cos();
-        c * u + s * v
+    let around: [DVec2; DIRECTIONS] = std::array::from_fn(|k| {
+        DVec2::from_angle(std::f64::consts::TAU * k as f64 / DIRECTIONS as f64)
     });
+    let moved = |from: DVec3, by: DVec2| project_to_surface(surface, from + by.x * u + by.y * v);
     let (mut radius, mut moves) = (first, 0);
     while radius > last && moves < MAX_MOVES {
-        let better = around.iter().find_map(|direction| {
-            let position = project_to_surface(surface, point.position + radius * *direction);
-            (partner.distance(position) < point.distance).then_some(())?;
+        let mut ring = [0.0; DIRECTIONS];
+        let better = around.iter().zip(&mut ring).find_map(|(direction, distance)| {
+            let position = moved(point.position, radius * *direction);
+            *distance = partner.distance(position);
+            (*distance < point.distance).then_some(())?;
             SurfacePoint::at(partner, position)
         });
-        match better {
-            Some(next) => {
-                point = next;
-                moves += 1;
-            }
-            None => radius *= 0.5,
+        if let Some(next) = better {
+            point = next;
+            moves += 1;
+            continue;
         }
+        if 0.5 * radius <= last && (is_sphere(surface) || partner_is_sphere(partner)) {
+            let by = vertex(point.distance, &ring, &around, radius);
+            let next = by.and_then(|by| SurfacePoint::at(partner, moved(point.position, by)));
+            return next.filter(|next| next.distance < point.distance).unwrap_or(point);
+        }
+        radius *= 0.5;
     }
     point
+}
+
+/// Vertex of the paraboloid through the distance `centre` and the distances on a `ring` of `radius`
+/// around it [m], if it lies within the ring.
+fn vertex(
+    centre: f64,
+    ring: &[f64; DIRECTIONS],
+    around: &[DVec2; DIRECTIONS],
+    radius: f64,
+) -> Option<DVec2> {
+    // f = f_0 + r g . e + r^2 / 4 (tr H + (H_xx - H_yy) cos 2t + 2 H_xy sin 2t) on the ring.
+    let (mut slope, mut trace, mut double) = (DVec2::ZERO, 0.0, DVec2::ZERO);
+    for (distance, direction) in ring.iter().zip(around) {
+        let rise = distance - centre;
+        slope += rise * *direction;
+        trace += rise;
+        double += rise * direction.rotate(*direction);
+    }
+    let count = DIRECTIONS as f64;
+    let slope = 2.0 / (count * radius) * slope;
+    let trace = 4.0 / (count * radius * radius) * trace;
+    let double = 8.0 / (count * radius * radius) * double;
+    let hessian = DMat2::from_cols(
+        DVec2::new(0.5 * (trace + double.x), 0.5 * double.y),
+        DVec2::new(0.5 * double.y, 0.5 * (trace - double.x)),
+    );
+    // Not finite if the distance does not curve.
+    let by = -(hessian.inverse() * slope);
+    (by.length() <= radius).then_some(by)
 }
 
 #[cfg(test)]

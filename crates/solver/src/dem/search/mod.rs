@@ -184,7 +184,7 @@ mod tests {
                 lower: DVec3::ZERO,
                 upper: DVec3::new(1.0, 1.0, 0.4),
                 periodic,
-                solid: [[false; 2]; 3],
+                sides: Default::default(),
             };
             let spheres = scatter(120, seed);
             let mut broad = BroadPhase::default();
@@ -201,7 +201,7 @@ mod tests {
             lower: DVec3::ZERO,
             upper: DVec3::ONE,
             periodic: [true; 3],
-            solid: [[false; 2]; 3],
+            sides: Default::default(),
         };
         let mut spheres = scatter(10, 5);
         spheres[3].centre.x = f64::NAN;

@@ -264,9 +264,10 @@ fn indices_in_sphere(lever_arm: DVec3, spacing: f64, radius: f64, count: i32) ->
     }
     let half_chord = square.sqrt();
     let start = ((-half_chord - lever_arm.x) / spacing).ceil() as i32;
-    let end = ((half_chord - lever_arm.x) / spacing).floor() as i32 + 1;
+    let end = ((half_chord - lever_arm.x) / spacing).floor() as i32;
     let start = start.clamp(0, count);
-    start..end.clamp(start, count)
+    // Saturating: a damaged checkpoint may have a grain far away.
+    start..end.saturating_add(1).clamp(start, count)
 }
 
 /// Shortens a span to the faces from the first to the last within each limit [m].

@@ -87,8 +87,8 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] leads
-    /// from the last pose of grain i, whose faces count as well; 0 if they do not.
+    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] is the
+    /// distance of grain i from its last pose, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
         self.neighbours.update(&self.mesh, &self.unknown_faces, self.reach, grains, displacement);
     }
@@ -194,7 +194,7 @@ impl NeighbourSearch {
             upper: mesh.upper(),
             periodic: [0, 1, 2]
                 .map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
-            solid: [[false; 2]; 3],
+            sides: Default::default(),
         };
         self.spheres.clear();
         let spheres = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {

@@ -152,7 +152,7 @@ fn sphere_distance<V: Vector>(radius: f64, variance: f64, [x, y, z]: [V; 3]) -> 
 }
 
 /// A neighbouring grain, or a periodic image of the grain itself.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeighbourGrain {
     /// Index of the neighbour.
     pub grain: usize,

@@ -1,0 +1,301 @@
+//! Forcing of the faces near several surfaces: of other grains, or of periodic images of the same
+//! grain.
+//!
+//! Next to one plane wall the forcing has two exact solutions, shear and parabola ([`forcing`]).
+//! In a gap of the width w = d_1 + d_2 between two parallel walls the corresponding solutions are
+//!
+//! shear:    g = m(d_1) - m(-d_2),
+//! parabola: f = w / 2 (m(d_1) + m(d_2)) - M(d_1) - M(d_2) - d_1 d_2 / 2 + 2 M(0),
+//!
+//! the averages over the band of the linear velocity between two walls of which one moves, and of
+//! y (w - y) / 2. They are exact with
+//!
+//! D_i = L m(d_i) / (m(d_i) - m(-d_j)), P = (D_1 + D_2) f - L f,
+//! L f = w / 2 (L m(d_1) + L m(d_2)) - L M(d_1) - L M(d_2) + 1.
+//!
+//! In wider gaps m(-d_j) vanishes, and D_i and 1 - P = c_1 + c_2 are those of single walls. Between
+//! walls at an angle the two corrections count with the factor max(0, -n_1 . n_2): in a corner of
+//! 90 degrees the sums over the walls are exact already. Several pairs add up.
+//! (`docs/decisions/0025-narrow-gaps.md`)
+//!
+//! Each grain forces a face with its part of the total, s_i = S_i / (1 + sum S). The forcing by one
+//! grain does not depend on the new velocities of the others, so each keeps its own equations.
+//!
+//! Legend: as in [`forcing`]; i and j surfaces, w width of the gap.
+//!
+//! [`forcing`]: super::forcing
+
+use glam::DVec3;
+
+use super::Scheme;
+use super::forcing::{FaceForcing, ForcedFaces, ForcingParams, drag, parabola, pressure_weight_of};
+use super::geometry::aperture::{aperture, forcing_reach, open_depth_integral};
+use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain};
+use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
+
+/// Least m(d_i) - m(-d_j) in a gap, over m(d_i): the shear of grains in contact remains finite.
+const LEAST_DEPTH: f64 = 0.1;
+
+/// Divides the forcing of the faces that `neighbours` force too among the grains. `forced` has the
+/// weights without neighbours.
+pub fn share_faces(
+    params: &ForcingParams,
+    band: &BandFaces,
+    neighbours: &[NeighbourGrain],
+    shapes: &NarrowBandShapes,
+    forced: &mut ForcedFaces,
+) {
+    forced.total_closed_fraction.clear();
+    if band.shared.is_empty() {
+        return;
+    }
+    forced.total_closed_fraction.extend_from_slice(&forced.closed_fraction);
+    let limit = forcing_reach(params.eps);
+    let mut surfaces = Vec::new();
+    for &(entry, x) in &band.shared {
+        let (distances, normal) = band.face(entry);
+        if params.scheme == Scheme::Aperture && distances[0] <= -params.eps {
+            // A face deep inside a grain takes the velocity of this grain alone.
+            continue;
+        }
+        surfaces.clear();
+        surfaces.push(NearSurface::new(params, distances, normal));
+        for other in neighbours {
+            let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
+            if d < limit {
+                let normal = other.pose.orientation * gradient.normalize_or_zero();
+                let mean = other.mean_distance(shapes, x, d);
+                surfaces.push(NearSurface::new(params, [d, mean], normal));
+            }
+        }
+        let (weight, [own, all]) = share(params, &mut surfaces);
+        forced.weight[entry] = weight as f32;
+        forced.closed_fraction[entry] = own.closed_fraction as f32;
+        forced.solid_fraction[entry] = own.solid_fraction as f32;
+        forced.total_closed_fraction[entry] = all.closed_fraction as f32;
+    }
+}
+
+/// Weight of the rigid velocity of the first of the `surfaces` near a face, its forcing, and that
+/// of all together; fractions at most one in all.
+fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceForcing; 2]) {
+    let mut open = 0.0;
+    for i in 0..surfaces.len() {
+        let mut depth = surfaces[i].shear.depth;
+        for j in (0..surfaces.len()).filter(|&j| j != i) {
+            let opposed = (-surfaces[i].normal.dot(surfaces[j].normal)).max(0.0);
+            depth -= opposed * surfaces[j].shear.depth_behind();
+            if i < j {
+                open += opposed * opening(&surfaces[i], &surfaces[j], params.eps);
+            }
+        }
+        let one = &mut surfaces[i];
+        if params.scheme == Scheme::Aperture && one.forcing.strength > 0.0 {
+            let depth = depth.max(LEAST_DEPTH * one.shear.depth);
+            one.forcing.strength = params.diffusion * one.shear.curvature / depth;
+        }
+    }
+    let sum = |part: fn(&FaceForcing) -> f64| -> f64 {
+        surfaces.iter().map(|one| part(&one.forcing)).sum()
+    };
+    let own = surfaces[0].forcing;
+    let all = FaceForcing {
+        strength: sum(|one| one.strength),
+        closed_fraction: sum(|one| one.closed_fraction),
+        solid_fraction: sum(|one| one.solid_fraction),
+    };
+    let closed = (all.closed_fraction - open).clamp(0.0, 1.0);
+    let solid = all.solid_fraction.min(1.0);
+    let part = |own: f64, all: f64, limited: f64| if all > 0.0 { own / all * limited } else { 0.0 };
+    let own = FaceForcing {
+        closed_fraction: part(own.closed_fraction, all.closed_fraction, closed),
+        solid_fraction: part(own.solid_fraction, all.solid_fraction, solid),
+        ..own
+    };
+    let all = FaceForcing { closed_fraction: closed, solid_fraction: solid, ..all };
+    (own.weight(all), [own, all])
+}
+
+/// Pressure weight that a face in the gap between two parallel walls has beyond 1 - c_1 - c_2.
+fn opening(one: &NearSurface, other: &NearSurface, eps: f64) -> f64 {
+    let [a, b] = [&one.mean_shear, &other.mean_shear];
+    let width = a.distance + b.distance;
+    let depths = [a.depth - b.depth_behind(), b.depth - a.depth_behind()];
+    if width <= 0.0 || depths.iter().any(|depth| *depth < 1e-9 * eps) {
+        return 0.0;
+    }
+    let drag = a.curvature / depths[0] + b.curvature / depths[1];
+    let centre = open_depth_integral(Scalar(0.0), eps).0;
+    let parabola = 0.5 * width * (a.depth + b.depth)
+        - one.integral
+        - other.integral
+        - 0.5 * a.distance * b.distance
+        + 2.0 * centre;
+    let curvature = 0.5 * width * (a.curvature + b.curvature)
+        - one.integral_curvature
+        - other.integral_curvature
+        + 1.0;
+    let weight = (drag * parabola - curvature).clamp(0.0, 1.0);
+    weight - (1.0 - one.forcing.closed_fraction - other.forcing.closed_fraction)
+}
+
+/// Profile of a shear over one wall at a face.
+#[derive(Clone, Copy, Debug, Default)]
+struct ShearProfile {
+    /// Distance d from the wall [m].
+    distance: f64,
+    /// Open depth m(d) [m].
+    depth: f64,
+    /// L m(d) [1/m].
+    curvature: f64,
+}
+
+impl ShearProfile {
+    fn depth_behind(&self) -> f64 {
+        // m(d) - m(-d) = d
+        self.depth - self.distance
+    }
+}
+
+/// A surface near a face.
+#[derive(Clone, Copy, Debug, Default)]
+struct NearSurface {
+    /// Unit normal, out of the grain.
+    normal: DVec3,
+    /// Forcing as if no other surface were near.
+    forcing: FaceForcing,
+    /// Shear at the distance of the face, for the drag.
+    shear: ShearProfile,
+    /// Shear at the mean distance, for the pressure weight.
+    mean_shear: ShearProfile,
+    /// M at the mean distance [m^2].
+    integral: f64,
+    /// L M at the mean distance.
+    integral_curvature: f64,
+}
+
+impl NearSurface {
+    /// Surface with the unit `normal` at a distance and a mean distance [m] from a face.
+    fn new(params: &ForcingParams, distances: [f64; 2], normal: DVec3) -> NearSurface {
+        let mut surface = NearSurface { normal, ..NearSurface::default() };
+        match params.scheme {
+            Scheme::Aperture => dispatch(Evaluate { params, distances, surface: &mut surface }),
+            Scheme::Paper => surface.forcing = params.blend(distances[0], normal),
+        }
+        surface
+    }
+}
+
+/// Evaluates one surface with the instruction set in use, in which fused products are instructions.
+struct Evaluate<'a> {
+    params: &'a ForcingParams,
+    distances: [f64; 2],
+    surface: &'a mut NearSurface,
+}
+
+impl Kernel for Evaluate<'_> {
+    type Number = f64;
+    #[inline(always)]
+    fn run<V: Vector<Number = f64>>(self) {
+        let Evaluate { params, distances, surface } = self;
+        let (eps, spacing) = (params.eps, params.spacing.to_array());
+        let [x, y, z] = surface.normal.to_array();
+        let normal = [Scalar(x), Scalar(y), Scalar(z)];
+        let (d, mean) = (Scalar(distances[0]), Scalar(distances[1]));
+        let [curvature, depth] = drag(d, normal, spacing, eps);
+        let mean_shear = drag(mean, normal, spacing, eps);
+        let driven = parabola(mean, normal, spacing, eps);
+        surface.forcing = FaceForcing {
+            strength: params.strength(d, curvature).0 / depth.0,
+            closed_fraction: 1.0 - pressure_weight_of(mean, eps, mean_shear, driven).0,
+            solid_fraction: 1.0 - aperture(d, eps).0,
+        };
+        surface.shear = ShearProfile { distance: d.0, depth: depth.0, curvature: curvature.0 };
+        let [curvature, depth] = mean_shear;
+        surface.mean_shear =
+            ShearProfile { distance: mean.0, depth: depth.0, curvature: curvature.0 };
+        (surface.integral_curvature, surface.integral) = (driven[0].0, driven[1].0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::immersed::geometry::aperture::reference;
+
+    const H: f64 = 0.5;
+    const EPS: f64 = 0.625;
+
+    /// Forcing of a face by two parallel walls at the distances `d` and `width - d`: drag over
+    /// viscosity by either, pressure weight.
+    fn between_walls(d: f64, width: f64, normal: DVec3) -> ([f64; 2], f64) {
+        let params = ForcingParams::new(Scheme::Aperture, EPS, DVec3::splat(H), 1.0, 1.0);
+        let one = NearSurface::new(&params, [d; 2], normal);
+        let other = NearSurface::new(&params, [width - d; 2], -normal);
+        let [(_, [first, all]), (_, [second, _])] =
+            [[one, other], [other, one]].map(|mut both| share(&params, &mut both));
+        ([first.strength, second.strength], 1.0 - all.closed_fraction)
+    }
+
+    /// Laplacian of `f(y)` at the distance `y` from a plane by differences of the positions.
+    fn laplacian(f: impl Fn(f64) -> f64, y: f64, n: DVec3) -> f64 {
+        let f = |x: DVec3| f(y + n.dot(x));
+        let second = |e: DVec3| (f(H * e) + f(-H * e) - 2.0 * f(DVec3::ZERO)) / (H * H);
+        DVec3::AXES.map(second).iter().sum()
+    }
+
+    #[test]
+    fn shear_and_parabola_between_two_plane_walls_are_exact_solutions() {
+        let m = |y| reference::open_depth(y, EPS);
+        let big_m = |y| reference::open_depth_integral(y, EPS);
+        for width in [0.1, 0.3, 0.5, 0.8, 1.3] {
+            // Velocities averaged over the band, between walls at 0 and at `width`.
+            let shear = |y: f64| m(y) - m(y - width);
+            let parabola =
+                |y: f64| 0.5 * width * (m(y) + m(y - width)) - big_m(y) + big_m(y - width);
+            for n in [DVec3::X, DVec3::new(1.0, 2.0, -2.0) / 3.0] {
+                for part in [-0.1, 0.0, 0.2, 0.5, 0.9, 1.1] {
+                    let y = part * width;
+                    let ([one, other], weight) = between_walls(y, width, n);
+                    let force = one * shear(y) - other * (width - shear(y));
+                    let residual = laplacian(shear, y, n) - force;
+                    assert!(residual.abs() < 1e-10, "shear {width} {y}: {residual:e}");
+                    let residual = laplacian(parabola, y, n) - (one + other) * parabola(y) + weight;
+                    assert!(residual.abs() < 1e-10, "parabola {width} {y}: {residual:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn far_walls_and_walls_at_right_angles_add_up() {
+        let params = ForcingParams::new(Scheme::Aperture, EPS, DVec3::splat(H), 1.0, 1.0);
+        let alone = |d: f64, normal| NearSurface::new(&params, [d; 2], normal);
+        for (one, other) in [
+            (alone(0.2, DVec3::X), alone(1.2, DVec3::NEG_X)),
+            (alone(0.2, DVec3::X), alone(0.3, DVec3::Y)),
+            (alone(0.2, DVec3::X), alone(0.3, DVec3::X)),
+        ] {
+            let forcing = [one, other].map(|surface| surface.forcing);
+            let (weight, [first, all]) = share(&params, &mut [one, other]);
+            let strength = forcing[0].strength + forcing[1].strength;
+            let closed = forcing[0].closed_fraction + forcing[1].closed_fraction;
+            assert!((all.strength - strength).abs() < 1e-12 * strength);
+            assert!((all.closed_fraction - closed.min(1.0)).abs() < 1e-12);
+            assert!((weight - first.strength / (1.0 + strength)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_forcing_of_touching_walls_is_finite() {
+        for width in [-0.05, 0.0, 1e-9, 1e-3] {
+            for part in [-1.0, 0.0, 0.3, 1.0] {
+                let (drag, weight) = between_walls(0.1 * part, width, DVec3::Z);
+                assert!(
+                    drag.iter().all(|d| d.is_finite()) && (0.0..=0.1).contains(&weight),
+                    "{width} {part}: {drag:?} {weight}"
+                );
+            }
+        }
+    }
+}
