@@ -53,8 +53,8 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
             count(threads, "thread"),
             out.display()
         );
+        check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
-    check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let job = case.job_in(&out, existing)?;
     let mut shown = ProgressDisplay::new(args.quiet, stop, diameter);

@@ -36,7 +36,7 @@ pub struct RunArgs {
     /// Do not draw the figures and report.html at the end of the run
     #[arg(long)]
     pub no_report: bool,
-    /// Print warnings and errors only
+    /// Print errors only; `check` prints the warnings of a case
     #[arg(long)]
     pub quiet: bool,
     /// Print the summary as a JSON object; other messages go to standard error

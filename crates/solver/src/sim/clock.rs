@@ -90,9 +90,10 @@ impl Clock {
         if (step - self.last_step).abs() <= ROUNDING * step { self.last_step } else { step }
     }
 
-    /// Advances the time by `step` [s].
-    pub fn advance(&mut self, step: f64) {
-        self.time += step;
+    /// Advances the time by `step` [s], exactly to the `horizon` [s] if the step ends there.
+    pub fn advance(&mut self, step: f64, horizon: f64) {
+        let ends = (step - horizon).abs() <= ROUNDING * step;
+        self.time += if ends { horizon } else { step };
         self.steps += 1;
         self.last_step = step;
     }
@@ -118,9 +119,10 @@ mod tests {
         };
         let mut steps = Vec::new();
         while clock.time < 1.0 - 1e-9 {
-            let step = clock.next_step(1.0, 1.0 - clock.time);
+            let horizon = 1.0 - clock.time;
+            let step = clock.next_step(1.0, horizon);
             assert!(step <= largest * (1.0 + 1e-9), "{step}");
-            clock.advance(step);
+            clock.advance(step, horizon);
             steps.push(step);
         }
         assert!((clock.time - 1.0).abs() < 1e-12);

@@ -53,7 +53,7 @@ impl Simulation {
             // Contact sub-steps alone (Eqs 6 to 36).
             Start::Dry(start) => start.move_grains(),
         }
-        self.clock.advance(dt);
+        self.clock.advance(dt, horizon);
         self.check_stability()
     }
 }
