@@ -309,3 +309,16 @@ fn position(mesh: &Mesh, offset: &[f64; 3], cell: IVec3) -> DVec3 {
     let offset = DVec3::from_array(*offset);
     mesh.origin + mesh.spacing * (cell.as_dvec3() - 1.0 + offset)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grain_far_away_has_no_faces() {
+        for x in [-1e30, -2147483648.0, 2147483647.0, 1e30] {
+            assert!(indices_in_sphere(DVec3::new(x, 0.0, 0.0), 1.0, 2.0, 100).is_empty(), "{x}");
+        }
+        assert_eq!(indices_in_sphere(DVec3::new(-5.0, 0.0, 0.0), 1.0, 2.0, 100), 3..8);
+    }
+}
