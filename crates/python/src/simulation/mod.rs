@@ -80,10 +80,10 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 /// ... )
 /// >>> sim = gw.Simulation(case)
 /// >>> for state in sim.run(every="5 ms", progress=False):
-/// ...     print(f"{state.time:.3f} s  {state.velocities[0, 2]:.4f} m/s")
-/// 0.000 s  0.0000 m/s
-/// 0.005 s  -0.0490 m/s
-/// 0.010 s  -0.0981 m/s
+/// ...     print(f"{state.time:.3f} s  {state.velocities[0, 2]:.3f} m/s")
+/// 0.000 s  0.000 m/s
+/// 0.005 s  -0.049 m/s
+/// 0.010 s  -0.098 m/s
 #[pyclass(module = "grainwake", name = "Simulation", weakref)]
 pub struct PySimulation {
     sim: Simulation,
