@@ -71,7 +71,7 @@ fn a_moving_floor_carries_a_sphere_as_a_floor_at_rest_stops_it() {
     // The same motion in two frames of reference: the sphere ends at 2/7 of the speed of the belt.
     assert!((carried.velocity - belt - stopped.velocity).length() < 1e-12);
     assert!((carried.angular_velocity - stopped.angular_velocity).length() < 1e-9);
-    assert!((carried.velocity - 2.0 / 7.0 * belt).length() < 0.005 * belt.length());
+    assert!((carried.velocity - 2.0 / 7.0 * belt).length() < 2e-4 * belt.length());
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn a_sphere_slides_on_over_a_slip_wall() {
     let grain = slid(DVec3::new(0.1, 0.0, 0.0), Side::Frictionless);
     // The nodes of the sphere are not quite even.
     let spin = 5e-4 * grain.angular_velocity.length();
-    assert!((grain.velocity.x - 0.1).abs() < 1e-4 && spin < 1e-4, "{} {spin}", grain.velocity);
+    assert!((grain.velocity.x - 0.1).abs() < 1e-12 && spin < 1e-7, "{} {spin}", grain.velocity);
 }
 
 /// Rebound of the sphere of Kharaz, Gorham & Salman: angle from the normal [deg], ratio of the

@@ -452,6 +452,6 @@ fn a_sphere_keeps_its_spin_on_a_frictionless_face() {
     }
     let Grain { velocity, angular_velocity, pose, .. } = &grains[1];
     println!("{} {velocity} {angular_velocity}", pose.position);
-    assert!((velocity - DVec3::new(0.2, 0.0, 0.0)).length() < 2e-3, "{velocity}");
-    assert!((angular_velocity - DVec3::new(0.0, 0.2, 0.0)).length() < 2e-3, "{angular_velocity}");
+    assert!((velocity - DVec3::new(0.2, 0.0, 0.0)).length() < 1e-6, "{velocity}");
+    assert!((angular_velocity - DVec3::new(0.0, 0.2, 0.0)).length() < 1e-7, "{angular_velocity}");
 }

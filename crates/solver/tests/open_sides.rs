@@ -248,7 +248,7 @@ fn a_floating_grain_floats_on_next_to_an_outflow() {
     while sim.time() < 0.5 {
         step(&mut sim);
         let rise = sim.grains()[0].velocity.z;
-        assert!(rise.abs() < 0.05, "speed {rise} at t = {}", sim.time());
+        assert!(rise.abs() < 1e-10, "speed {rise} at t = {}", sim.time());
     }
 }
 

@@ -16,7 +16,7 @@ pub struct Enclosure {
     pub sides: [[Side; 2]; 3],
 }
 
-/// Face of the box for a grain.
+/// Kind of a face of the box, for grains.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Side {
     /// No wall.

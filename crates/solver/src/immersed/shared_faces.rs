@@ -76,8 +76,8 @@ pub fn share_faces(
     }
 }
 
-/// Weight of the rigid velocity of the first of the `surfaces` near a face, its forcing, and that
-/// of all together; fractions at most one in all.
+/// Weight of the rigid velocity of the first of the `surfaces` near a face, its forcing, and the
+/// forcing of all together. The closed and the solid fraction of all are at most one.
 fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceForcing; 2]) {
     let mut open = 0.0;
     for i in 0..surfaces.len() {
@@ -116,7 +116,8 @@ fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceFor
     (own.weight(all), [own, all])
 }
 
-/// Pressure weight that a face in the gap between two parallel walls has beyond 1 - c_1 - c_2.
+/// Pressure weight of a face in the gap between two parallel walls, less the weight 1 - c_1 - c_2
+/// that the sum over single walls would give.
 fn opening(one: &NearSurface, other: &NearSurface, eps: f64) -> f64 {
     let [a, b] = [&one.mean_shear, &other.mean_shear];
     let width = a.distance + b.distance;
@@ -151,8 +152,8 @@ struct ShearProfile {
 }
 
 impl ShearProfile {
+    /// Open depth m(-d) on the other side of the wall [m]; m(d) - m(-d) = d.
     fn depth_behind(&self) -> f64 {
-        // m(d) - m(-d) = d
         self.depth - self.distance
     }
 }

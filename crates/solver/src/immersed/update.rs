@@ -26,17 +26,10 @@ pub struct ImmersedGrain {
     pub forced: ForcedFaces,
     /// Correction of the advection; unused while the grain is isolated.
     pub correction: AdvectionCorrection,
-    /// Pose, neighbours and step for which the other lists were made.
-    pub located_for: Option<LocatedFor>,
-}
-
-/// Values on which the lists of a grain depend. While they stay the same, as in a fixed bed, the
-/// grain is not located again.
-#[derive(PartialEq)]
-pub struct LocatedFor {
-    pose: Pose,
-    neighbours: Vec<NeighbourGrain>,
-    dt: f64,
+    /// Pose of the grain and step for which its lists were made; none if they must be made again.
+    pub located_for: Option<(Pose, f64)>,
+    /// Neighbours for which the lists were made.
+    located_beside: Vec<NeighbourGrain>,
 }
 
 impl ImmersedGrain {
@@ -197,14 +190,14 @@ impl<R: Real> CouplingContext<'_, R> {
         predictions: &[Prediction<R>; 3],
         scratch: &mut LocateScratch,
     ) {
-        let now = LocatedFor {
-            pose: self.input.grains[index].pose,
-            neighbours: self.locator.neighbours(index).to_vec(),
-            dt: self.input.dt,
-        };
-        if grain.located_for.as_ref() != Some(&now) {
+        let neighbours = self.locator.neighbours(index);
+        let now = Some((self.input.grains[index].pose, self.input.dt));
+        // The lists of a grain in a bed at rest stay as they are.
+        if grain.located_for != now || grain.located_beside != neighbours {
             self.locate(index, &mut grain.body, &mut grain.forced, scratch);
-            grain.located_for = Some(now);
+            grain.located_for = now;
+            grain.located_beside.clear();
+            grain.located_beside.extend_from_slice(neighbours);
         }
         update.system = self.assemble(index, predictions, &mut grain.forced);
     }

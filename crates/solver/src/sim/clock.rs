@@ -25,7 +25,7 @@ const MAX_GROWTH: f64 = 1.2;
 /// hysteresis keeps the number of steps from alternating.
 const HYSTERESIS: f64 = 0.95;
 
-/// Relative difference of steps that is one of rounding.
+/// Relative difference up to which two steps differ by rounding only.
 const ROUNDING: f64 = 1e-12;
 
 impl Clock {

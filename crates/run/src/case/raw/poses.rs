@@ -41,7 +41,7 @@ pub struct RawPoses {
     /// Density [kg/m3]: with `file`, unless the table gives it; with `run`, instead of that of the
     /// run.
     pub density: Option<Located<Quantity<Density>>>,
-    /// Motion of all grains, as for `[[grain]]`: "fixed" makes a fixed bed of a settled heap. With
-    /// `run`, instead of that of the run.
+    /// Motion of all grains, as for `[[grain]]`; with `run`, instead of that of the run. "fixed"
+    /// makes a fixed bed of a settled heap.
     pub motion: Option<Located<RawMotion>>,
 }

@@ -83,7 +83,7 @@ fn open_faces(setup: &Setup) -> Vec<String> {
     found
 }
 
-/// Free surfaces that are not level: the flat lid is a surface at rest only across gravity.
+/// Free surfaces that are not level, or that have no fluid below them.
 fn surface_against_gravity(setup: &Setup) -> Option<String> {
     let mut sides = (0..6).map(|k| (k / 2, k % 2));
     let tilted = |(axis, side): &(usize, usize)| {
@@ -94,13 +94,13 @@ fn surface_against_gravity(setup: &Setup) -> Option<String> {
     };
     let (axis, side) = sides.find(tilted)?;
     Some(format!(
-        "gravity does not point straight into the fluid at the free surface on the {} side of {}: a real surface would not be flat and still there; turn gravity, or make the side a \"slip\" wall",
+        "gravity does not point straight into the fluid at the free surface on the {} side of {}: a free surface at rest is level, with the fluid below it; turn gravity, or make the side a \"slip\" wall",
         SIDES[side], AXES[axis]
     ))
 }
 
-/// Grains that start so close to an inflow or outflow that they move under their last load, which
-/// is none.
+/// Grains that start so close to an inflow or outflow that they move under the load of the step
+/// before, and before the first step there is none.
 fn starts_next_to_open_face(setup: &Setup) -> Option<String> {
     setup.fluid.as_ref()?;
     let mesh = &setup.mesh;

@@ -28,10 +28,6 @@ pub(in crate::dem) struct PairProperties {
     pub effective_shear_modulus: f64,
     /// Damping ratio: the larger one of the two bodies.
     pub damping_ratio: f64,
-    /// Whether the partner is a wall.
-    pub partner_is_wall: bool,
-    /// Whether the partner is a wall without friction.
-    pub frictionless: bool,
 }
 
 /// Properties of one body of a pair.
@@ -62,8 +58,6 @@ impl PairProperties {
             effective_youngs_modulus: 1.0 / (a.normal_compliance + b.normal_compliance),
             effective_shear_modulus: 1.0 / (a.tangential_compliance + b.tangential_compliance),
             damping_ratio: a.damping_ratio.max(b.damping_ratio),
-            partner_is_wall: partner.is_none(),
-            frictionless: false,
         }
     }
 }
@@ -227,8 +221,6 @@ mod tests {
             effective_youngs_modulus: 2.5e10,
             effective_shear_modulus: 8e9,
             damping_ratio: 0.0,
-            partner_is_wall: false,
-            frictionless: false,
         };
         let (mut overlap, mut speed, mut time, dt) = (0.0, 3.0, 0.0, 1e-9);
         let expected = HertzMindlin.contact_time(&pair, speed, 0.0);

@@ -81,13 +81,15 @@ impl ContactModel {
         self.law.contact_time(pair, speed, overlap)
     }
 
-    /// Evaluates the loads of a pair at the end of a sub-step of `step` [s] into `record.loads` and
-    /// advances the friction history; a step of zero evaluates the present state.
+    /// Evaluates the loads of a pair with the coefficient `friction` at the end of a sub-step of
+    /// `step` [s] into `record.loads` and advances the friction history; a step of zero evaluates
+    /// the present state.
     pub fn evaluate(
         &self,
         record: &mut ContactRecord,
         closest: Option<ClosestPoint>,
         properties: &PairProperties,
+        friction: f64,
         pair: &PairKinematics,
         step: f64,
     ) {
@@ -102,11 +104,7 @@ impl ContactModel {
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
-            coefficient: match properties {
-                PairProperties { frictionless: true, .. } => 0.0,
-                PairProperties { partner_is_wall: true, .. } => self.params.wall_friction,
-                _ => self.params.friction,
-            },
+            coefficient: friction,
             stiffness: at.tangential_stiffness,
             history_scale: history_scale(record.tangential_stiffness, at.tangential_stiffness),
             damping: damping * at.tangential_damping_ratio,

@@ -189,27 +189,29 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
         mid_step: [bodies[i].mid_step, RigidVelocity::default()],
         end_of_step: [bodies[i].end_of_step, RigidVelocity::default()],
     };
-    let mut properties = pair_properties(&record.key, bodies, context.wall);
-    let closest = match record.key.partner {
+    let params = &context.model.params;
+    let (friction, closest) = match record.key.partner {
         Partner::Grain(j) => {
             let image = IVec3::from(record.key.image).as_dvec3() * context.enclosure.period();
             let b = bodies[j].posed_shape(grains[j].pose.position + image);
             pair.branch = a.position - b.position;
             pair.mid_step[1] = bodies[j].mid_step;
             pair.end_of_step[1] = bodies[j].end_of_step;
-            record.patch.find_grain_contact(&a, &b, reach)
+            (params.friction, record.patch.find_grain_contact(&a, &b, reach))
         }
         Partner::Wall { axis, side } => {
             let (axis, side) = (axis as usize, side as usize);
             let wall = context.enclosure.sides[axis][side];
             let motion = RigidVelocity { linear: wall.velocity(), angular: DVec3::ZERO };
             (pair.mid_step[1], pair.end_of_step[1]) = (motion, motion);
-            properties.frictionless = wall == Side::Frictionless;
+            let rough = wall != Side::Frictionless;
+            let friction = if rough { params.wall_friction } else { 0.0 };
             let face = context.enclosure.plane(axis, side);
             let offset = face.distance(a.position);
             let patch = &mut record.patch;
-            patch.find_wall_contact(&a, face.inward, offset, reach)
+            (friction, patch.find_wall_contact(&a, face.inward, offset, reach))
         }
     };
-    (context.model).evaluate(record, closest, &properties, &pair, context.step);
+    let properties = pair_properties(&record.key, bodies, context.wall);
+    (context.model).evaluate(record, closest, &properties, friction, &pair, context.step);
 }

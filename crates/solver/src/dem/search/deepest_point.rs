@@ -268,8 +268,9 @@ const DIRECTIONS: usize = 6;
 /// Compass search from `point`: six points around it in the tangent plane, at a radius that is
 /// halved from `first` to `last` [m] if none of them is closer. If one of the two bodies is a
 /// sphere, the last ring gives the vertex of a paraboloid: the point of a sphere that rolls would
-/// otherwise be up to half a radius behind the deepest one, and the sphere would gain energy.
-/// Between two sampled surfaces the vertex would be that of their roughness.
+/// otherwise lag behind the deepest one, by up to half the last radius of the search, and the
+/// sphere would gain energy. Between two sampled surfaces the vertex would be that of their
+/// roughness.
 fn compass_search(
     surface: &Shape,
     partner: &PartnerField,

@@ -62,14 +62,15 @@ impl Reference {
         [drag, 1.0 - open.clamp(0.0, 1.0), 1.0 - aperture(d, eps)]
     }
 
-    /// Factor of the drag of a face near the surface `one`, because of the surface `other`:
-    /// m(d_1) / (m(d_1) - m(-d_2)) between parallel walls, 1 in a corner.
+    /// Part of the open depth m(d_1) over the surface `one` that the surface `other` takes [m]:
+    /// m(-d_2) between parallel walls, none in a corner.
     fn depth_taken(&self, one: &NearestImage, other: &NearestImage) -> f64 {
         opposed(one, other) * open_depth(-other.distance, self.eps)
     }
 
-    /// Pressure weight between two walls beyond 1 - c_1 - c_2: that of the parabola y (w - y) / 2,
-    /// averaged over the band, in a gap of the width w.
+    /// Pressure weight between two walls, less the weight 1 - c_1 - c_2 that the sum over single
+    /// walls would give. In a gap of the width w the parabola y (w - y) / 2, averaged over the
+    /// band, is an exact solution.
     fn opening(&self, [one, other]: [&NearestImage; 2]) -> f64 {
         let (eps, [x, y]) = (self.eps, [one, other].map(|image| image.mean_distance));
         let width = x + y;
