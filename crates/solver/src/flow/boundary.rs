@@ -108,45 +108,22 @@ impl Boundaries {
         component: usize,
         plane: &mut [R],
     ) {
-        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
-        for side in 0..2 {
-            let (ghost, inner) = if side == 0 { (0, 1) } else { (nx + 1, nx) };
-            match self.ghost_rule(0, side, component) {
-                GhostRule::Unused => {}
-                GhostRule::Periodic => plane.chunks_exact_mut(row).for_each(|row| {
-                    (row[0], row[nx + 1]) = (row[nx], row[1]);
-                }),
-                GhostRule::ZeroGradient => {
-                    plane.chunks_exact_mut(row).for_each(|row| row[ghost] = row[inner])
-                }
-                GhostRule::Wall(wall) => {
-                    let next = second(inner, nx);
-                    plane
-                        .chunks_exact_mut(row)
-                        .for_each(|row| row[ghost] = beyond_wall(wall, row[inner], row[next], nx));
-                }
-            }
-        }
-        for side in 0..2 {
-            let (ghost, inner) = if side == 0 { (0, 1) } else { (ny + 1, ny) };
-            fill_ghost_layer(plane, row, self.ghost_rule(1, side, component), ghost, inner, ny);
+        for axis in [0, 1] {
+            let rules = [0, 1].map(|side| self.ghost_rule(axis, side, component));
+            fill_ghosts(plane, layout, axis, rules);
         }
     }
 
     /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
     pub(crate) fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
         let layout = velocity.x.layout();
-        let (plane, nz) = (layout.plane(), layout.cells[2]);
         if !self.is_periodic(2) {
-            self.fill_ghosts_of_plane(layout, 2, &mut velocity.z[(nz + 1) * plane..]);
+            let upper = (layout.cells[2] + 1) * layout.plane();
+            self.fill_ghosts_of_plane(layout, 2, &mut velocity.z[upper..]);
         }
         for component in 0..3 {
-            for side in 0..2 {
-                let (ghost, inner) = if side == 0 { (0, 1) } else { (nz + 1, nz) };
-                let rule = self.ghost_rule(2, side, component);
-                let q = velocity.component_mut(component);
-                fill_ghost_layer(q, plane, rule, ghost, inner, nz);
-            }
+            let rules = [0, 1].map(|side| self.ghost_rule(2, side, component));
+            fill_ghosts(velocity.component_mut(component), layout, 2, rules);
         }
     }
 
@@ -166,51 +143,30 @@ impl Boundaries {
     }
 }
 
-/// Condition on the pressure at a face of the box; an outflow has a zero normal gradient.
-fn pressure_condition(boundary: &Boundary) -> Ends {
-    match boundary {
-        Boundary::Periodic => Ends::Periodic,
-        Boundary::Wall { .. }
-        | Boundary::Slip
-        | Boundary::FreeSurface
-        | Boundary::Inflow { .. }
-        | Boundary::Outflow => Ends::Neumann,
-    }
-}
-
 impl Boundaries {
-    /// Conditions on the pressure at the ends of each axis.
+    /// Conditions on the pressure at the ends of each axis: outflows too have a zero normal
+    /// gradient.
     pub(crate) fn pressure_ends(&self) -> [Ends; 3] {
-        [0, 1, 2].map(|axis| pressure_condition(&self.0[axis][0]))
+        self.periodic().map(|periodic| if periodic { Ends::Periodic } else { Ends::Neumann })
     }
 
     /// Fills the ghosts along x and y of one plane of the pressure.
     pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
-        let (row, [nx, ny, _]) = (layout.row(), layout.cells);
-        let ends = self.pressure_ends()[0];
-        for row in plane.chunks_exact_mut(row) {
-            (row[0], row[nx + 1]) = match ends {
-                Ends::Periodic => (row[nx], row[1]),
-                Ends::Neumann => (row[1], row[nx]),
-            };
+        for axis in [0, 1] {
+            fill_ghosts(plane, layout, axis, self.pressure_rules(axis));
         }
-        self.fill_pressure_layers(plane, row, 1, ny);
     }
 
     /// Fills the ghost planes of the pressure.
     pub(crate) fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
         let layout = pressure.layout();
-        self.fill_pressure_layers(pressure, layout.plane(), 2, layout.cells[2]);
+        fill_ghosts(pressure, layout, 2, self.pressure_rules(2));
     }
 
-    /// Fills the ghost layers of the pressure at both ends of an axis with `n` cells.
-    fn fill_pressure_layers<R: Real>(&self, values: &mut [R], layer: usize, axis: usize, n: usize) {
-        let rule = match self.pressure_ends()[axis] {
-            Ends::Periodic => GhostRule::Periodic,
-            Ends::Neumann => GhostRule::ZeroGradient,
-        };
-        for (ghost, inner) in [(0, 1), (n + 1, n)] {
-            fill_ghost_layer(values, layer, rule, ghost, inner, n);
+    fn pressure_rules(&self, axis: usize) -> [GhostRule; 2] {
+        match self.pressure_ends()[axis] {
+            Ends::Periodic => [GhostRule::Periodic; 2],
+            Ends::Neumann => [GhostRule::ZeroGradient; 2],
         }
     }
 }
@@ -228,11 +184,6 @@ enum GhostRule {
     Wall(f64),
 }
 
-/// Second interior layer from the end at which `inner` is the first, of layers 1..=n.
-fn second(inner: usize, n: usize) -> usize {
-    if inner == 1 { 2.min(n) } else { inner - 1 }
-}
-
 /// Ghost value beyond a wall of velocity `wall` [m/s], on the parabola through the wall and the two
 /// nearest values, which makes the shear at the wall second-order.
 fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
@@ -243,27 +194,27 @@ fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
     })
 }
 
-/// Fills the layer `ghost` of `layer` entries; `inner` is adjacent, 1..=n are interior.
-fn fill_ghost_layer<R: Real>(
-    values: &mut [R],
-    layer: usize,
-    rule: GhostRule,
-    ghost: usize,
-    inner: usize,
-    n: usize,
-) {
-    let from = match rule {
-        GhostRule::Unused => return,
-        GhostRule::Periodic => n + 1 - inner,
-        GhostRule::ZeroGradient => inner,
-        GhostRule::Wall(wall) => {
-            let next = second(inner, n);
-            for i in 0..layer {
-                let [near, next] = [inner, next].map(|from| values[from * layer + i]);
-                values[ghost * layer + i] = beyond_wall(wall, near, next, n);
-            }
-            return;
+/// Fills the ghosts at the lower and upper end of an axis, of a plane (x, y) or of a field (z), by
+/// the rule of each end.
+fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [GhostRule; 2]) {
+    let (n, step) = (layout.cells[axis], layout.strides()[axis]);
+    // Ghosts of one end: one in each row along x, else a whole row or plane.
+    let (count, apart) =
+        if axis == 0 { (values.len() / layout.row(), layout.row()) } else { (step, 1) };
+    let ends = [(0, 1, 2.min(n)), (n + 1, n, n.max(2) - 1)];
+    for ((ghost, near, next), rule) in ends.into_iter().zip(rules) {
+        let (from, wall) = match rule {
+            GhostRule::Unused => continue,
+            GhostRule::Periodic => (n + 1 - near, None),
+            GhostRule::ZeroGradient => (near, None),
+            GhostRule::Wall(velocity) => (near, Some(velocity)),
+        };
+        for at in (0..count).map(|index| index * apart) {
+            let value = values[at + from * step];
+            values[at + ghost * step] = match wall {
+                None => value,
+                Some(wall) => beyond_wall(wall, value, values[at + next * step], n),
+            };
         }
-    };
-    values.copy_within(from * layer..(from + 1) * layer, ghost * layer);
+    }
 }

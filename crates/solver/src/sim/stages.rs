@@ -62,26 +62,15 @@ pub(super) struct Predicted<'a>(Context<'a>);
 pub(super) struct Moved<'a>(Context<'a>, TrialStep);
 /// Grains located, with their equations of motion.
 pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains, TrialStep);
-/// Contact loads known.
-pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains, FinalPoses);
+/// Contact loads and the poses at the end of the step known.
+pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains);
 /// Rigid velocities imposed on the prediction.
-pub(super) struct Rigid<'a>(Context<'a>, FinalPoses);
+pub(super) struct Rigid<'a>(Context<'a>);
 /// Flow with a divergence-free velocity.
 pub(super) struct Projected<'a> {
     context: Context<'a>,
-    final_poses: FinalPoses,
     /// Momentum of the fluid over its density before the projection [m^4/s].
     momentum_before: DVec3,
-}
-
-/// Contact sub-steps that give the poses at the end of a step.
-#[derive(Clone, Copy)]
-enum FinalPoses {
-    /// Poses of the trial step, under the hydrodynamic load of the last step: no contact acts or
-    /// acted in the step before.
-    TrialStep,
-    /// Poses of the repeated step, with the response of the fluid in this step.
-    Resolved,
 }
 
 impl<'a> Start<'a> {
@@ -241,7 +230,10 @@ impl<'a> Coupled<'a> {
         let pending = data.previous.iter().any(PreviousStep::has_pending_velocity);
         if data.contact.iter().all(Load::is_zero) && !pending {
             solid.dynamics.accept(trial);
-            return Resolved(step, coupled, FinalPoses::TrialStep);
+            for (end, grain) in data.ends.iter_mut().zip(grains) {
+                end.pose = grain.pose;
+            }
+            return Resolved(step, coupled);
         }
         let added_density = solid.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
@@ -250,14 +242,14 @@ impl<'a> Coupled<'a> {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
             (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
         });
-        Resolved(step, coupled, FinalPoses::Resolved)
+        Resolved(step, coupled)
     }
 }
 
 impl<'a> Resolved<'a> {
     /// Gives the grains their new velocities and imposes them on the forced faces.
     pub fn impose_rigidity(self) -> Rigid<'a> {
-        let Resolved(mut step, coupled, final_poses) = self;
+        let Resolved(mut step, coupled) = self;
         let Context { solid, flow } = &mut step;
         let open_sides = &mut solid.open_sides;
         let rigid = RigidityInput {
@@ -272,18 +264,18 @@ impl<'a> Resolved<'a> {
         if let Some(open_sides) = open_sides {
             flow.fluid.cover_boundary(&open_sides.covered_faces(solid.grains));
         }
-        Rigid(step, final_poses)
+        Rigid(step)
     }
 }
 
 impl<'a> Rigid<'a> {
     /// Projects the velocity onto the divergence-free fields.
     pub fn project(self) -> Projected<'a> {
-        let Rigid(mut context, final_poses) = self;
+        let Rigid(mut context) = self;
         let Context { solid, flow } = &mut context;
         let momentum_before = flow.fluid.measures().momentum;
         timed(&mut solid.times.project, || flow.fluid.project(solid.dt));
-        Projected { context, final_poses, momentum_before }
+        Projected { context, momentum_before }
     }
 }
 
@@ -296,9 +288,7 @@ impl Projected<'_> {
         let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
         for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
             data.located[i] = grain.pose;
-            if let FinalPoses::Resolved = self.final_poses {
-                grain.pose = data.ends[i].pose;
-            }
+            grain.pose = data.ends[i].pose;
             let previous = &mut data.previous[i];
             let change = grain.rigid_velocity() - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
