@@ -8,8 +8,8 @@ use comfy_table::{CellAlignment, Table, presets};
 use grainwake_run::FailureKind;
 use grainwake_run::number_format::size;
 use grainwake_study::{
-    Analysis, Archive, Options, Outcome, Plan, Run, RunRecord, RunState, Selection, StudyError,
-    execute, expected_cost, records, run_state, write_tables,
+    Analysis, Archive, MANIFEST, Options, Outcome, Plan, Run, RunRecord, RunState, Selection,
+    StudyError, execute, expected_cost, records, run_state, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -27,14 +27,20 @@ impl From<StudyError> for Exit {
             StudyError::Occupied { .. } => {
                 Exit::with_help(BAD_INPUT, error.to_string(), "give another folder with -o")
             }
-            StudyError::Damaged { .. } => Exit::with_help(
-                BAD_INPUT,
-                error.to_string(),
-                "start the study with `grainwake study`: it writes the file again",
-            ),
+            StudyError::Damaged { ref file, .. } => {
+                let help = if file.file_name().is_some_and(|name| name == MANIFEST) {
+                    "start the study with `grainwake study`: it writes the file again"
+                } else {
+                    "mend or restore the file, or remove it: the runs whose folders exist are \
+                     measured again, the others are repeated"
+                };
+                Exit::with_help(BAD_INPUT, error.to_string(), help)
+            }
             StudyError::Io { action, ref source, .. } => {
-                use std::io::ErrorKind::{FileTooLarge, InvalidData, InvalidInput, NotFound};
-                let kinds = [NotFound, InvalidData, InvalidInput, FileTooLarge];
+                use std::io::ErrorKind::{
+                    FileTooLarge, InvalidData, InvalidInput, IsADirectory, NotFound,
+                };
+                let kinds = [NotFound, InvalidData, InvalidInput, IsADirectory, FileTooLarge];
                 let bad = action == "read" && kinds.contains(&source.kind());
                 let help = if bad {
                     "give the path of a study file, for example studies/dkt-morphology/study.toml"
@@ -61,7 +67,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let (jobs, each) = threads::share(jobs, args.threads);
     if args.list || args.dry_run {
         plan.check_folder(&folder)?;
-        let archive = Archive::read(&folder);
+        let archive = Archive::read(&folder)?;
         let states: Vec<(usize, RunState)> =
             chosen.iter().map(|i| (*i, run_state(&runs[*i], &folder, &archive))).collect();
         if args.json {
@@ -70,13 +76,13 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         if args.list {
             return print(&list(runs, &states));
         }
-        return print(&dry_run(args, &plan, &folder, &states, jobs, each));
+        return print(&dry_run(args, &plan, &folder, &states, jobs, each)?);
     }
     if let Some(note) = plan.damage_in(&folder) {
         tell!("note: {note}");
     }
     plan.create_folder(&folder)?;
-    let outdated = Archive::read(&folder).outdated(runs);
+    let outdated = Archive::read(&folder)?.outdated(runs);
     if outdated > 0 {
         tell!(
             "note: {} in table.json had another case, end or program: their rows move to table.earlier.json (--accept COMMIT counts those of another commit)",
@@ -105,7 +111,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());
     let ended = execute(runs, &chosen, &folder, &options, &board)?;
     board.clear();
-    let rows = records(&plan, &folder);
+    let rows = records(&plan, &folder)?;
     write_tables(&rows, &folder)?;
     let shown: Vec<&RunRecord> = chosen.iter().map(|i| &rows[*i]).collect();
     if args.json {
@@ -153,7 +159,7 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     Err(Exit::with_help(
         exit_code(worst),
         format!("{} of {} runs failed:\n{}", failed.len(), ended.len(), lines.join("\n")),
-        "the other runs are finished; --retry restarts failed runs",
+        "the other chosen runs have ended; --retry restarts failed runs",
     ))
 }
 
@@ -188,7 +194,7 @@ fn dry_run(
     states: &[(usize, RunState)],
     jobs: usize,
     threads: usize,
-) -> String {
+) -> Result<String, StudyError> {
     let mut lines = Vec::new();
     let mut to_do: Vec<&Run> = Vec::new();
     for (i, state) in states {
@@ -207,7 +213,7 @@ fn dry_run(
         lines.push(format!("{}: {doing}", run.name));
         to_do.push(run);
     }
-    let cost = expected_cost(&to_do, plan, &records(plan, folder), folder);
+    let cost = expected_cost(&to_do, plan, &records(plan, folder)?, folder);
     let time = clock(cost.wall_s / (jobs * threads) as f64);
     let (most, reason) = match cost.basis {
         0 => {
@@ -226,7 +232,7 @@ fn dry_run(
         count(threads, "thread"),
         size(jobs as u64 * largest),
     ));
-    lines.join("\n")
+    Ok(lines.join("\n"))
 }
 
 /// Returns the table of the terminal.

@@ -89,7 +89,7 @@ fn of_study(folder: &Path) -> Result<Viewer, Exit> {
     if let Some(note) = damage {
         tell!("note: {note}");
     }
-    let records = records(&plan, folder);
+    let records = records(&plan, folder)?;
     let axes: BTreeSet<&String> = records.iter().flat_map(|record| record.levels.keys()).collect();
     let quantities = columns(&records);
     let mut table = StudyTable { title: plan.title.clone(), ..StudyTable::default() };

@@ -1,4 +1,4 @@
-//! Errors of a study, and writing of files in one piece.
+//! Errors of a study, reading of tables and writing of files in one piece.
 
 use std::path::{Path, PathBuf};
 
@@ -71,6 +71,19 @@ impl<T> At<T> for std::io::Result<T> {
 /// Writes a file in one piece.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     write_atomically(path, true, |out| out.write_all(bytes)).at("write", path)
+}
+
+/// Reads the rows of a JSON table; none if the file does not exist.
+///
+/// # Errors
+/// [`StudyError::Damaged`] with the line of the damage.
+pub(crate) fn read_rows<T: serde::de::DeserializeOwned>(file: &Path) -> Result<Vec<T>, StudyError> {
+    let text = match std::fs::read(file) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        text => text.at("read", file)?,
+    };
+    serde_json::from_slice(&text)
+        .map_err(|error| StudyError::Damaged { file: file.into(), what: error.to_string() })
 }
 
 /// Writes a value as indented JSON.

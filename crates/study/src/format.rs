@@ -40,7 +40,8 @@ pub fn p_value(p: f64) -> String {
 
 /// Value rounded to six significant digits, for tables.
 pub fn rounded(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
+    // The sum turns -0 into 0.
+    format!("{value:.5e}").parse().unwrap_or(value) + 0.0
 }
 
 #[cfg(test)]

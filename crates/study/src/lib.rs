@@ -32,7 +32,7 @@ pub use measure::table::{columns, to_csv, write_tables};
 pub use measure::trajectory::Trajectory;
 pub use page::{StudyReportFiles, render};
 pub use plan::claims::{
-    Analysis, Claim, Condition, Correlations, FigureRequest, Kissing, Sign, Test,
+    Analysis, Claim, Condition, Correlations, FigureRequest, Kissing, Range, Sign, Test,
 };
 pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};

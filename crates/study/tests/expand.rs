@@ -218,6 +218,50 @@ fn problems_are_located() {
 }
 
 #[test]
+fn members_are_located_in_the_ensemble_and_share_no_folder_with_a_model() {
+    let ensemble = "[ensemble]\nmembers = 3\noffset = \"0.05 mm\"\n";
+    let line = |text: &str| 1 + text.lines().position(|line| line.starts_with("members")).unwrap();
+    let one = |text: &str| {
+        let problem = problems(text).remove(0);
+        assert!(problem.help.is_some(), "{problem}");
+        assert_eq!(problem.place().map(|(_, line, _)| line), Some(line(text)), "{problem}");
+        problem.to_string()
+    };
+    let twice = STUDY.replace("\"alone\"", "\"light-rough-m1\"");
+    let found = problems(&format!("{twice}{ensemble}")).remove(0).to_string();
+    assert!(found.contains("member 1 of \"light-rough\"") && found.contains("both"), "{found}");
+    let far = ensemble.replace("0.05 mm", "20 mm");
+    assert!(one(&format!("{STUDY}{far}")).contains("of \"light-smooth\""));
+    let none = ensemble.replace("[ensemble]", "[ensemble]\ngrain = 5");
+    assert!(one(&format!("{STUDY}{none}")).contains("moves grain 5"));
+    let packed = STUDY.replace(
+        "set = { \"grain.1.velocity\" = [0, 0, 0] }",
+        "set = { packing = [{ shapes = [{ kind = \"sphere\", diameter = \"1 mm\" }], density = 2500, count = 1, region = { lower = [0, 0, \"20 mm\"], upper = [\"4 mm\", \"4 mm\", \"24 mm\"] } }] }",
+    );
+    assert!(one(&format!("{packed}{ensemble}")).contains("a position of their own"));
+    // A whole table sets the height by the gap.
+    let table = STUDY.replace(
+        "set = { \"grain.1.velocity\" = [0, 0, 0] }",
+        "set = { \"grain.1\" = { shape = { kind = \"sphere\", diameter = \"2 mm\" }, nodes = 200, density = 2500, position = [\"5 mm\", \"5 mm\"], gap_above = { grain = 0, gap = \"2 mm\" } } }",
+    );
+    assert!(names(&format!("{table}{ensemble}")).contains(&"alone-m2".into()));
+}
+
+#[test]
+fn columns_of_the_table_are_no_names_of_axes_and_factors() {
+    for (from, to) in [
+        ("name = \"grip\"", "name = \"state\""),
+        ("name = \"grip\"", "name = \"\""),
+        ("factors = { density", "factors = { kiss_time"),
+    ] {
+        let problem = problems(&STUDY.replace(from, to)).remove(0);
+        let text = problem.to_string();
+        assert!(text.contains("column of the table") || text.contains("no name"), "{text}");
+        assert!(problem.place().is_some() && problem.help.is_some());
+    }
+}
+
+#[test]
 fn case_problems_are_located_in_the_study_file() {
     let found = problems(&STUDY.replace("\"contact.friction\" = 0 ", "\"contact.fricton\" = 0 "));
     let p = &found[0];

@@ -36,7 +36,7 @@ fn session(plan: &Plan, study: &Path) -> Result<Vec<Outcome>, StudyError> {
     plan.create_folder(study)?;
     let all: Vec<usize> = (0..plan.runs.len()).collect();
     let ended = execute(&plan.runs, &all, study, &options, &Quiet)?;
-    write_tables(&records(plan, study), study)?;
+    write_tables(&records(plan, study)?, study)?;
     Ok(ended.into_iter().map(|(_, outcome)| outcome).collect())
 }
 

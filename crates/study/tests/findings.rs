@@ -92,7 +92,7 @@ fn orders_hold_are_contradicted_or_stay_open() {
     let paper = rows(as_in_the_paper);
     let (found, says) = verdict(&paper, ORDER);
     assert_eq!(found, "holds");
-    assert!(says.contains("for 16 of 16 grains") && says.contains("p < 0.0001"), "{says}");
+    assert!(says.contains("for 16 of 16 pairs of models") && says.contains("p < 0.0001"), "{says}");
     let reversed =
         ORDER.replace("\"o1\"", "\"x\"").replace("\"o3\"", "\"o1\"").replace("\"x\"", "\"o3\"");
     assert_eq!(verdict(&paper, &reversed).0, "contradicted");
@@ -299,6 +299,79 @@ fn wrong_names_are_located() {
     assert!(p.to_string().contains("no model \"g99-o1\""), "{p}");
     let p = problem("[figures]\nstory = 1\n");
     assert!(p.to_string().contains("unknown key `story`"), "{p}");
+}
+
+#[test]
+fn conditions_and_tests_that_cannot_hold_are_refused() {
+    let paper = rows(as_in_the_paper);
+    let first = |text: String| {
+        let problem =
+            Analysis::parse("analysis.toml", &text, &models(&paper)).unwrap_err().remove(0);
+        assert!(problem.place().is_some(), "{problem:?}");
+        problem.to_string()
+    };
+    let when = |condition: &str| {
+        first(format!("[[claim]]\nsays = \"a\"\n{ORDER}\nwhere = {{ {condition} }}"))
+    };
+    assert!(when("sphericity = { atleast = 0.7 }").contains("at_least = ..."));
+    assert!(when("sphericity = { at_least = 0.9, at_most = 0.5 }").contains("no value"));
+    assert!(when("sphericity = {}").contains("no end"));
+    assert!(when("orientation = []").contains("without values"));
+    let claim = |test: &str| {
+        first(format!("[[claim]]\nsays = \"a\"\nquantity = \"kiss_time\"\ntest.{test}"))
+    };
+    let order = "order = { axis = \"orientation\", more = \"o1\", less = \"o1\" }";
+    assert!(claim(order).contains("compared with itself"));
+    assert!(claim("near = { model = \"sphere\", within = -1 }").contains("positive number"));
+    let same = "[kissing]\nby = \"orientation\"\ngrid = \"orientation\"";
+    assert!(first(same.into()).contains("the same axis"));
+}
+
+#[test]
+fn equal_values_of_zero_are_equal() {
+    let none = rows(|_, _, _| PairMeasures { role_changes: Some(0.0), ..kiss(10.0) });
+    let equal = "quantity = \"role_changes\"\ntest.equal = { axis = \"orientation\", values = [\"o2\", \"o4\"], within = 0.05 }";
+    let (found, says) = verdict(&none, equal);
+    assert!(found == "holds" && says.contains("difference 0.0 %"), "{found}: {says}");
+    let near = "quantity = \"role_changes\"\ntest.near = { model = \"sphere\", within = 0.1 }";
+    assert_eq!(verdict(&none, near).0, "holds");
+    // No relative difference to zero.
+    let some = rows(|_, r, o| PairMeasures {
+        role_changes: Some(if o == 3 && r > 0.9 { 0.0 } else { 1.0 }),
+        ..kiss(10.0)
+    });
+    let (found, says) = verdict(&some, near);
+    assert!(found == "open" && !says.contains("NaN") && !says.contains("inf"), "{found}: {says}");
+}
+
+#[test]
+fn runs_that_end_in_the_water_are_censored_at_their_end() {
+    let mut rows = rows(|_, _, _| PairMeasures::default());
+    for row in &mut rows {
+        row.end_time_s = Some(0.5);
+    }
+    let found = observations(&rows, "kiss_time", &BTreeMap::new());
+    let end = 0.5 / (2e-3_f64 / 9.81).sqrt();
+    assert_eq!(found.len(), 65);
+    assert!(found.iter().all(|o| o.censored && (o.value / end - 1.0).abs() < 1e-12));
+}
+
+#[test]
+fn stages_that_last_until_the_landing_are_lower_bounds() {
+    let stay = |tumble: Option<f64>| PairMeasures {
+        parted: Some(false),
+        tumble_time: tumble,
+        kissing_stage: Some(4.0),
+        contact_stage: Some(9.0),
+        ..kiss(10.0)
+    };
+    let rows = rows(|_, _, o| stay((o == 1).then_some(14.0)));
+    let censored = |quantity: &str| {
+        let found = observations(&rows, quantity, &BTreeMap::new());
+        found.iter().filter(|o| o.censored).count()
+    };
+    assert_eq!(censored("contact_stage"), 65);
+    assert_eq!(censored("kissing_stage"), 49, "the 16 that tumble are complete");
 }
 
 #[test]

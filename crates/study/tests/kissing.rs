@@ -126,3 +126,18 @@ fn grids_are_compared_model_by_model() {
 fn equal_records_give_equal_intervals() {
     assert_eq!(evaluate(&records(), Some("cells")), evaluate(&records(), Some("cells")));
 }
+
+#[test]
+fn grids_are_in_the_order_of_the_study_even_if_runs_are_missing() {
+    let mut some = records();
+    // The first model of the coarse grid has not finished.
+    let first = some.iter().position(|r| r.levels["cells"] == "c08").unwrap();
+    for record in &mut some {
+        if record.model == records()[first].model {
+            record.state = StateKind::Missing;
+        }
+    }
+    let found = evaluate(&some, Some("cells"));
+    assert!(!found.grids.is_empty());
+    assert!(found.grids.iter().all(|g| g.coarse == "c08" && g.fine == "c16"), "{:?}", found.grids);
+}

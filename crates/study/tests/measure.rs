@@ -46,6 +46,7 @@ fn measures(events: &[(f64, EventKind)], oblong: bool) -> PairMeasures {
         up: DVec3::Z,
         scales: SCALES,
         events: &events,
+        periods: [None; 3],
         oblong,
     })
 }
@@ -137,4 +138,25 @@ fn every_quantity_has_a_column() {
     names.sort_unstable();
     listed.sort_unstable();
     assert_eq!(names, listed);
+}
+
+#[test]
+fn distances_are_those_of_the_nearest_periodic_images() {
+    let at = |x: f64| history(move |_| DVec3::X * x, |_| DQuat::IDENTITY, 1.0);
+    let (left, right) = (at(0.5e-3), at(9.5e-3));
+    let closest = |periods| {
+        let pair = PairHistory {
+            grains: [&left, &right],
+            up: DVec3::Z,
+            scales: SCALES,
+            events: &[],
+            oblong: false,
+            periods,
+        };
+        let measures = PairMeasures::from_history(&pair);
+        assert_eq!(measures.closest, measures.final_distance);
+        measures.closest.unwrap() * SCALES.diameter
+    };
+    assert!((closest([None; 3]) - 9e-3).abs() < 1e-12);
+    assert!((closest([Some(10e-3), None, None]) - 1e-3).abs() < 1e-12);
 }

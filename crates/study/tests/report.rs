@@ -8,7 +8,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use grainwake_run::provenance::Provenance;
-use grainwake_study::{Condition, Kissing, Plan, RUNS, Run, Study, StudyReportFiles, render};
+use grainwake_study::{
+    Condition, Kissing, Plan, RUNS, Range, Run, Study, StudyReportFiles, render,
+};
 
 /// Plan of the 65 models of the repository, with the hashes of the synthetic run folders.
 fn synthetic_plan() -> Plan {
@@ -291,8 +293,8 @@ fn the_page_tells_who_kisses_and_does_not_name_every_missing_run() {
     let folder = study(root.path(), |run| ["o1", "o3"].contains(&&*orientation(run)));
     let path = folder.join("study.json");
     let mut plan: Plan = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-    // Another title keeps the analysis of the plan.
-    plan.title = "Who kisses".into();
+    // Without the study file, the analysis of the plan is used.
+    plan.study = "gone.toml".into();
     plan.analysis.kissing = Some(Kissing { by: "orientation".into(), grid: None });
     std::fs::write(&path, serde_json::to_string(&plan).unwrap()).unwrap();
     let rendered = render(&folder).unwrap();
@@ -328,8 +330,8 @@ fn claims_and_figures_can_be_restricted_to_some_runs() {
     assert!(names(&all).contains(&"claims".to_owned()));
     let path = folder.join("study.json");
     let mut plan: Plan = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-    plan.title = "Only spherical grains".into();
-    let spherical = Condition::Range { at_least: Some(0.7), at_most: None };
+    plan.study = "gone.toml".into();
+    let spherical = Condition::Range(Range { at_least: Some(0.7), at_most: None });
     plan.analysis.when.insert("sphericity".into(), spherical);
     std::fs::write(&path, serde_json::to_string(&plan).unwrap()).unwrap();
     let some = render(&folder).unwrap();

@@ -9,8 +9,8 @@ use std::time::Duration;
 use common::{STUDY, folder, plan};
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Archive, Options, Outcome, Plan, RunRecord, RunState, StateKind, Study, StudyObserver, execute,
-    records, run_state, to_csv, write_tables,
+    Archive, Options, Outcome, Plan, RunRecord, RunState, StateKind, Study, StudyError,
+    StudyObserver, execute, records, render, run_state, to_csv, write_tables,
 };
 
 struct Quiet;
@@ -45,7 +45,7 @@ fn run(plan: &Plan, study: &Path, watcher: &dyn StudyObserver, options: &Options
 }
 
 fn states(plan: &Plan, study: &Path) -> Vec<RunState> {
-    let archive = Archive::read(study);
+    let archive = Archive::read(study).unwrap();
     plan.runs.iter().map(|r| run_state(r, study, &archive)).collect()
 }
 
@@ -112,7 +112,7 @@ fn resumed_studies_give_identical_bits() {
     }
     assert!(rounds > 3, "it was interrupted {rounds} times");
     assert_eq!(results(&plan, &whole), results(&plan, &broken));
-    let (a, b) = (records(&plan, &whole), records(&plan, &broken));
+    let (a, b) = (records(&plan, &whole).unwrap(), records(&plan, &broken).unwrap());
     let measured = |rows: &[grainwake_study::RunRecord]| {
         rows.iter().map(|r| (r.pair.clone(), r.steps)).collect::<Vec<_>>()
     };
@@ -169,7 +169,7 @@ fn a_failed_run_does_not_stop_the_others() {
     assert!(
         matches!(&ended[4], Outcome::Failed(why, FailureKind::Computation) if why.contains("it blew up"))
     );
-    assert_eq!(records(&plan, &study)[4].remark.as_deref(), Some("it blew up"));
+    assert_eq!(records(&plan, &study).unwrap()[4].remark.as_deref(), Some("it blew up"));
     let ended = run(&plan, &study, &Quiet, &Options { retry: true, ..options(1) });
     assert!(matches!(ended[4], Outcome::Finished(_)));
 }
@@ -202,6 +202,19 @@ fn folders_with_other_contents_are_refused() {
     let second = plan(&other).unwrap();
     let error = second.create_folder(&study).unwrap_err().to_string();
     assert!(error.contains("holds another study, \"test\""), "{error}");
+    // Most study files are called study.toml.
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::create_dir(&elsewhere).unwrap();
+    std::fs::copy(folder.path().join("case.toml"), elsewhere.join("case.toml")).unwrap();
+    std::fs::rename(&other, elsewhere.join("study.toml")).unwrap();
+    let third = plan(&elsewhere.join("study.toml")).unwrap();
+    assert!(third.create_folder(&study).is_err());
+    // A corrected title, and a study file that was moved, are no other study.
+    std::fs::write(&path, STUDY.replace("title = \"test\"", "title = \"tests\"")).unwrap();
+    plan(&path).unwrap().create_folder(&study).unwrap();
+    let moved = elsewhere.join("moved.toml");
+    std::fs::rename(&path, &moved).unwrap();
+    plan(&moved).unwrap().create_folder(&study).unwrap();
     let foreign = folder.path().join("foreign");
     std::fs::create_dir_all(&foreign).unwrap();
     std::fs::write(foreign.join("thesis.tex"), "").unwrap();
@@ -215,7 +228,7 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     let study = folder.path().join("out");
     plan.create_folder(&study).unwrap();
     execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
-    let rows = records(&plan, &study);
+    let rows = records(&plan, &study).unwrap();
     write_tables(&rows, &study).unwrap();
     let words: Vec<String> = rows.iter().map(|r| r.state.to_string()).collect();
     assert_eq!(words, ["finished", "missing", "missing", "missing", "finished"]);
@@ -232,7 +245,53 @@ fn the_table_has_every_run_and_survives_removal_of_the_run_folders() {
     assert_eq!(&lines[1][column("kiss_time")], "");
     assert_eq!(to_csv(&rows).lines().count(), 6);
     std::fs::remove_dir_all(study.join("runs")).unwrap();
-    assert_eq!(records(&plan, &study), rows, "the table is kept");
+    assert_eq!(records(&plan, &study).unwrap(), rows, "the table is kept");
+}
+
+#[test]
+fn a_damaged_table_is_refused_and_stays() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0], &study, &options(1), &Quiet).unwrap();
+    write_tables(&records(&plan, &study).unwrap(), &study).unwrap();
+    std::fs::remove_dir_all(study.join("runs")).unwrap();
+    let table = study.join("table.json");
+    let damaged = std::fs::read_to_string(&table).unwrap().replace("\n]", ",\n]");
+    std::fs::write(&table, &damaged).unwrap();
+    let refused = |error: StudyError| {
+        let text = error.to_string();
+        assert!(text.contains("table.json is damaged") && text.contains("line"), "{text}");
+    };
+    refused(render(&study).unwrap_err());
+    refused(records(&plan, &study).unwrap_err());
+    refused(Archive::read(&study).unwrap_err());
+    refused(execute(&plan.runs, &[0], &study, &options(1), &Quiet).unwrap_err());
+    refused(write_tables(&[], &study).unwrap_err());
+    assert_eq!(std::fs::read_to_string(&table).unwrap(), damaged);
+}
+
+#[test]
+fn a_finished_run_with_damaged_files_keeps_its_values() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0], &study, &options(1), &Quiet).unwrap();
+    let before = records(&plan, &study).unwrap();
+    write_tables(&before, &study).unwrap();
+    let file = plan.runs[0].folder(&study).join("grains.csv");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replacen(',', ";", 40)).unwrap();
+    let after = records(&plan, &study).unwrap();
+    let remark = after[0].remark.clone().unwrap();
+    assert!(remark.contains("grains.csv"), "{remark}");
+    assert_eq!(after[0].pair, before[0].pair);
+    render(&study).unwrap();
+    let page = std::fs::read_to_string(study.join("report.html")).unwrap();
+    assert!(page.contains("grains.csv"), "the page names the damage");
+    assert_eq!(records(&plan, &study).unwrap()[0].pair, before[0].pair);
 }
 
 #[test]
@@ -242,7 +301,7 @@ fn a_study_continues_from_its_archive() {
     let study = folder.path().join("out");
     first.create_folder(&study).unwrap();
     execute(&first.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
-    write_tables(&records(&first, &study), &study).unwrap();
+    write_tables(&records(&first, &study).unwrap(), &study).unwrap();
     // Only the table goes to another machine.
     let archive = folder.path().join("archive");
     std::fs::create_dir(&archive).unwrap();
@@ -251,9 +310,9 @@ fn a_study_continues_from_its_archive() {
     let had: Vec<bool> = ended.iter().map(|o| *o == Outcome::AlreadyFinished).collect();
     assert_eq!(had, [true, false, false, false, true]);
     assert!(!archive.join("runs/alone").exists(), "not repeated");
-    let both = records(&first, &archive);
+    let both = records(&first, &archive).unwrap();
     assert!(both.iter().all(|record| record.finished() && record.pair.is_some()));
-    assert_eq!(both[4], records(&first, &study)[4]);
+    assert_eq!(both[4], records(&first, &study).unwrap()[4]);
     // A run whose case has changed since is repeated.
     write_tables(&both, &archive).unwrap();
     std::fs::remove_dir_all(archive.join("runs")).unwrap();
@@ -278,7 +337,7 @@ fn finished_runs_of_accepted_programs_count() {
         serde_json::from_slice(&std::fs::read(&provenance).unwrap()).unwrap();
     made["commit"] = other.clone().into();
     std::fs::write(&provenance, made.to_string()).unwrap();
-    let mut rows = records(&plan, &study);
+    let mut rows = records(&plan, &study).unwrap();
     let accepting = plan.clone().accepting(std::slice::from_ref(&other)).unwrap();
     let id_by_other = |i: usize| accepting.runs[i].accepted_ids[0].clone();
     rows[4].id = id_by_other(4);
@@ -293,7 +352,7 @@ fn finished_runs_of_accepted_programs_count() {
     assert!(wrong.to_string().contains("900fc4e") && wrong.help.unwrap().contains("12"));
     let plan = accepting.clone();
     assert_eq!(kinds(&plan), [finished, missing, missing, missing, finished]);
-    let rows = records(&plan, &study);
+    let rows = records(&plan, &study).unwrap();
     for i in [0, 4] {
         assert!(rows[i].finished() && rows[i].pair.is_some());
         assert_eq!(rows[i].id, id_by_other(i), "the row names the program");
@@ -313,11 +372,11 @@ fn finished_runs_of_another_program_are_kept_in_the_earlier_table() {
     plan.create_folder(&study).unwrap();
     execute(&plan.runs, &[0, 4], &study, &options(1), &Quiet).unwrap();
     // Another program made the first run; only the rows of the table are left.
-    let mut rows = records(&plan, &study);
+    let mut rows = records(&plan, &study).unwrap();
     rows[0].id = "0".repeat(rows[0].id.len());
     write_tables(&rows, &study).unwrap();
     std::fs::remove_dir_all(study.join("runs")).unwrap();
-    let outdated = || Archive::read(&study).outdated(&plan.runs);
+    let outdated = || Archive::read(&study).unwrap().outdated(&plan.runs);
     assert_eq!(outdated(), 1);
 
     let earlier = || -> Vec<RunRecord> {
@@ -325,16 +384,16 @@ fn finished_runs_of_another_program_are_kept_in_the_earlier_table() {
         serde_json::from_slice(&text).unwrap()
     };
     for _ in 0..2 {
-        write_tables(&records(&plan, &study), &study).unwrap();
+        write_tables(&records(&plan, &study).unwrap(), &study).unwrap();
         assert_eq!(earlier(), rows[..1], "the row is kept once");
     }
     assert_eq!(outdated(), 0);
-    assert!(records(&plan, &study)[4].finished());
+    assert!(records(&plan, &study).unwrap()[4].finished());
     // The sound row of the other run joins the first when it is replaced, its successor too.
-    let mut changed = records(&plan, &study);
+    let mut changed = records(&plan, &study).unwrap();
     changed[4].id.clone_from(&rows[0].id);
     write_tables(&changed, &study).unwrap();
-    write_tables(&records(&plan, &study), &study).unwrap();
+    write_tables(&records(&plan, &study).unwrap(), &study).unwrap();
     let names: Vec<String> = earlier().into_iter().map(|row| row.name).collect();
     assert_eq!(names, [0, 4, 4].map(|run: usize| rows[run].name.clone()));
     plan.create_folder(&study).unwrap();
@@ -367,7 +426,7 @@ fn a_damaged_plan_is_rebuilt_from_the_runs() {
     let study = folder.path().join("out");
     let first = plan(&path).unwrap();
     run(&first, &study, &Quiet, &options(2));
-    let before = records(&first, &study);
+    let before = records(&first, &study).unwrap();
     write_tables(&before, &study).unwrap();
     let manifest = study.join("study.json");
     let whole = std::fs::read(&manifest).unwrap();
@@ -377,7 +436,7 @@ fn a_damaged_plan_is_rebuilt_from_the_runs() {
         assert!(Plan::read(&study).unwrap_err().to_string().contains("study.json is damaged"));
         let (rebuilt, note) = Plan::read_or_rebuild(&study).unwrap();
         assert!(note.unwrap().contains("writes the file again"));
-        let mut found = records(&rebuilt, &study);
+        let mut found = records(&rebuilt, &study).unwrap();
         found.sort_by_key(|record| before.iter().position(|old| old.name == record.name));
         assert_eq!(found, before, "with levels, factors and results");
     }
@@ -385,7 +444,7 @@ fn a_damaged_plan_is_rebuilt_from_the_runs() {
     std::fs::remove_file(study.join("table.json")).unwrap();
     let (rebuilt, _) = Plan::read_or_rebuild(&study).unwrap();
     assert_eq!(rebuilt.runs.len(), 5);
-    let found = records(&rebuilt, &study);
+    let found = records(&rebuilt, &study).unwrap();
     assert!(found.iter().all(|record| record.finished() && record.pair.is_some()));
     // The study goes on as if nothing had happened, also without the file.
     for damage in [true, false] {

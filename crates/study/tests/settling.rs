@@ -59,7 +59,7 @@ fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
 }
 
 fn rows(plan: &Plan, out: &Path) -> Vec<RunRecord> {
-    records(plan, out)
+    records(plan, out).unwrap()
 }
 
 fn page(out: &Path) -> String {

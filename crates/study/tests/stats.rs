@@ -29,7 +29,11 @@ fn spearman_of_known_samples() {
     let rising: Vec<f64> = (0..16).map(f64::from).collect();
     let cubes: Vec<f64> = rising.iter().map(|x| x.powi(3)).collect();
     let perfect = spearman(&rising, &cubes).unwrap();
-    assert!(perfect.value == 1.0 && perfect.p == 0.0 && perfect.low > 0.9 && perfect.high < 1.0);
+    assert!(perfect.value == 1.0 && perfect.p < 1e-13 && perfect.low > 0.9 && perfect.high < 1.0);
+    // Of the 24 orders of four values two are perfect; of the 6 orders with two ties, too.
+    let p = |x: &[f64]| spearman(x, &x.iter().map(|x| -x).collect::<Vec<_>>()).unwrap().p;
+    assert!((p(&[1.0, 2.0, 3.0, 4.0]) - 2.0 / 24.0).abs() < 1e-15);
+    assert!((p(&[1.0, 1.0, 2.0, 2.0]) - 2.0 / 6.0).abs() < 1e-15);
     assert!(spearman(&rising, &[1.0; 16]).is_none());
     assert!(spearman(&[1.0, 2.0, 3.0], &[1.0, 2.0, 3.0]).is_none());
 }

@@ -10,7 +10,8 @@ use crate::run_folder::History;
 /// Draws the mean height, speed and number of contacts of many grains.
 pub fn many(scene: &Scene) -> Option<Figure> {
     let moving = scene.moving();
-    let first = &scene.run.grains[*moving.first()?];
+    // Grains that leave the box have shorter histories.
+    let longest = moving.iter().map(|g| &scene.run.grains[*g]).max_by_key(|h| h.len())?;
     let (_, factor) = scene.features.time_axis();
     let up = scene.features.up;
     let mean = |value: &dyn Fn(&History, usize) -> f64| -> Points {
@@ -18,9 +19,9 @@ pub fn many(scene: &Scene) -> Option<Figure> {
             let histories = moving.iter().map(|g| &scene.run.grains[*g]);
             let values = histories.filter(|h| h.len() > row).map(|h| value(h, row));
             let (sum, count) = values.fold((0.0, 0), |(sum, n), v| (sum + v, n + 1));
-            (first.time[row] * factor, sum / f64::from(count))
+            (longest.time[row] * factor, sum / f64::from(count))
         };
-        (0..first.len()).map(at).collect()
+        (0..longest.len()).map(at).collect()
     };
     let squares = mean(&|h, row| h.velocity[row].length_squared());
     let speed: Points = squares.into_iter().map(|(t, v)| (t, v.sqrt())).collect();

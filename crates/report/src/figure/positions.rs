@@ -30,7 +30,7 @@ fn is_seen(outline: &Outline, window: Window) -> bool {
 /// Draws the grains at the end of the run, coloured by height.
 pub fn figure(scene: &Scene) -> Option<Figure> {
     let run = scene.run;
-    let grains = run.moving();
+    let grains = run.remaining();
     let last = |g: usize| run.grains[g].len() - 1;
     let place = |g: usize| run.wrapped(run.grains[g].position[last(g)]);
     let up = scene.vertical();

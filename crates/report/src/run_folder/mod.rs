@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde_json::Value;
 
-use grainwake_formats::events::Event;
+use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::table::{Damage, Table};
 use grainwake_formats::vti::{self, Image};
 use grainwake_formats::vtp::{self, Surface};
@@ -58,6 +58,15 @@ pub struct RunFolder {
     pub surfaces: Vec<FrameFile>,
     /// Missing or omitted parts.
     pub notes: Vec<String>,
+}
+
+/// Returns the shortest image of a distance vector in a box with the given `periods` [m].
+pub fn nearest_image(line: DVec3, periods: [Option<f64>; 3]) -> DVec3 {
+    let part = |axis: usize| match periods[axis] {
+        Some(period) => line[axis] - period * (line[axis] / period).round(),
+        None => line[axis],
+    };
+    DVec3::new(part(0), part(1), part(2))
 }
 
 impl RunFolder {
@@ -152,6 +161,22 @@ impl RunFolder {
         grains.filter(|i| !self.grains[*i].is_empty()).collect()
     }
 
+    /// Returns the grains that change place: not the fixed ones.
+    pub fn displaced(&self) -> Vec<usize> {
+        let moves = |history: &History| {
+            let mut positions = history.position.iter();
+            positions.next().is_some_and(|first| positions.any(|p| p != first))
+        };
+        (0..self.grains.len()).filter(|grain| moves(&self.grains[*grain])).collect()
+    }
+
+    /// Returns the grains that have a history and did not leave the box.
+    pub fn remaining(&self) -> Vec<usize> {
+        let gone = self.events.iter().filter(|event| event.kind == EventKind::Left);
+        let gone: Vec<usize> = gone.flat_map(|event| event.grains.iter().copied()).collect();
+        self.moving().into_iter().filter(|grain| !gone.contains(grain)).collect()
+    }
+
     /// Returns a number of the summary by its name.
     pub fn summary_number(&self, name: &str) -> Option<f64> {
         self.summary.as_ref()?.get(name)?.as_f64()
@@ -179,13 +204,14 @@ impl RunFolder {
         (faces[axis][0] == "periodic").then_some(size[axis])
     }
 
+    /// Returns the lengths of the box along its periodic axes [m]; `None` for other axes.
+    pub fn periods(&self) -> [Option<f64>; 3] {
+        [0, 1, 2].map(|axis| self.period(axis))
+    }
+
     /// Returns the shortest periodic image of a distance vector.
     pub fn nearest(&self, line: DVec3) -> DVec3 {
-        let part = |axis: usize| match self.period(axis) {
-            Some(period) => line[axis] - period * (line[axis] / period).round(),
-            None => line[axis],
-        };
-        DVec3::new(part(0), part(1), part(2))
+        nearest_image(line, self.periods())
     }
 
     /// Returns the periodic image of a point inside the box.

@@ -133,6 +133,11 @@ impl Case {
         }
     }
 
+    /// Returns whether the case file or an override gives a dotted key: "grain.1.gap_above".
+    pub fn gives(&self, key: &str) -> bool {
+        self.source.value_of(key).is_some()
+    }
+
     /// Compares the memory of the run with the memory that is free.
     ///
     /// # Errors

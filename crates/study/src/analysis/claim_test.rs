@@ -118,8 +118,8 @@ fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -
     let larger = differences.iter().filter(|d| **d > 0.0).count();
     let says = |e: &Estimate| {
         format!(
-            "{name} is larger in {more} than in {less} for {larger} of {} grains; difference {} \
-             ({}), {}",
+            "{name} is larger in {more} than in {less} for {larger} of {} pairs of models; \
+             difference {} ({}), {}",
             e.n,
             significant(e.value),
             interval(e, significant),
@@ -132,8 +132,9 @@ fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -
 
 fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
     let pairs = matched(all, axis, a, b);
-    let relative =
-        |(a, b): &(&Observation, &Observation)| 2.0 * (a.value - b.value) / (a.value + b.value);
+    let relative = |(a, b): &(&Observation, &Observation)| {
+        relative_difference(a.value, b.value, 0.5 * (a.value + b.value))
+    };
     let relative: Vec<f64> = pairs.iter().map(relative).collect();
     let says = |e: &Estimate| {
         format!(
@@ -193,7 +194,8 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     };
     let model = &reference.model;
     let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
-    let relative = |o: &&Observation| o.value / reference.value - 1.0;
+    let relative =
+        |o: &&Observation| relative_difference(o.value, reference.value, reference.value);
     let relative: Vec<f64> = others.iter().map(relative).collect();
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
     let largest = relative.iter().fold(0.0, larger);
@@ -209,6 +211,11 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     };
     let censored = others.iter().filter(|o| o.censored).count();
     Outcome::new((others.len(), censored), effect, claimed, signed_rank(&relative), says)
+}
+
+/// Difference of two values over `scale`; zero for equal values, also if both are zero.
+fn relative_difference(value: f64, other: f64, scale: f64) -> f64 {
+    if value == other { 0.0 } else { (value - other) / scale }
 }
 
 /// Number of pairs, and of pairs with a right-censored observation.

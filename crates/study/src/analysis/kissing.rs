@@ -130,8 +130,8 @@ type Pair<'a> = [&'a Outcomes; 2];
 pub fn kissing(analysis: &Analysis, records: &[RunRecord]) -> Option<KissingResults> {
     let Kissing { by, grid } = analysis.kissing.as_ref()?;
     let models = outcomes(records);
-    let levels = names(&models, by);
-    let grids = grid.as_ref().map(|axis| names(&models, axis)).unwrap_or_default();
+    let levels = names(records, by);
+    let grids = grid.as_ref().map(|axis| names(records, axis)).unwrap_or_default();
     let on = |wanted: Option<&str>| -> Vec<&Outcomes> {
         let on_grid = |m: &&Outcomes| match (grid, wanted) {
             (Some(axis), Some(wanted)) => m.level(axis) == Some(wanted),
@@ -192,12 +192,13 @@ fn outcomes(records: &[RunRecord]) -> Vec<Outcomes> {
     models.into_iter().map(|(_, model)| model).collect()
 }
 
-/// Returns the levels of an axis in order of first appearance.
-fn names(models: &[Outcomes], axis: &str) -> Vec<String> {
+/// Returns the levels of an axis in the order of the study file, whether their runs have finished
+/// or not.
+fn names(records: &[RunRecord], axis: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
-    for level in models.iter().filter_map(|m| m.level(axis)) {
-        if !out.iter().any(|known| known == level) {
-            out.push(level.to_owned());
+    for level in records.iter().filter_map(|record| record.levels.get(axis)) {
+        if !out.contains(level) {
+            out.push(level.clone());
         }
     }
     out

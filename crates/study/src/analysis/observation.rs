@@ -1,10 +1,11 @@
-//! Observations of a quantity, one per model, with right-censoring by the landing.
+//! Observations of a quantity, one per model, with right-censoring by the landing or the end of the
+//! run.
 
 use std::collections::BTreeMap;
 
 use super::statistics::median;
 use crate::measure::record::RunRecord;
-use crate::plan::claims::Condition;
+use crate::plan::claims::{Condition, Range};
 
 /// Observed value of a quantity for one model: the median over the ensemble.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +20,8 @@ pub struct Observation {
     pub value: f64,
     /// Smallest and largest value over the ensemble.
     pub range: (f64, f64),
-    /// Whether the observation is right-censored: the pair landed before the event.
+    /// Whether the observation is right-censored: the pair landed, or the run ended, before the
+    /// event.
     pub censored: bool,
 }
 
@@ -39,7 +41,8 @@ impl Observation {
 
 /// Returns a quantity of a run and whether it is right-censored.
 ///
-/// The times of events that did not occur before the landing are censored at the landing.
+/// The times of events that did not occur are censored at the landing, or at the end of a run in
+/// which no grain lands.
 pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
     if !record.finished() {
         return None;
@@ -48,10 +51,11 @@ pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
         return Some((value, record.is_lower_bound(quantity)));
     }
     let pair = record.pair.as_ref()?;
-    let landing = pair.landing_time.map(|time| (time, true));
+    let end = || Some(record.end_time_s? / record.up_and_time()?.1);
+    let censored = || Some((pair.landing_time.or_else(end)?, true));
     match quantity {
-        "kiss_time" => landing,
-        "tumble_time" | "pass_time" | "separation_time" if pair.kiss_time.is_some() => landing,
+        "kiss_time" => censored(),
+        "tumble_time" | "pass_time" | "separation_time" if pair.kiss_time.is_some() => censored(),
         _ => None,
     }
 }
@@ -107,9 +111,11 @@ pub(crate) fn meets(record: &RunRecord, when: &BTreeMap<String, Condition>) -> b
     when.iter().all(|(name, condition)| match condition {
         Condition::Is(level) => record.levels.get(name) == Some(level),
         Condition::In(levels) => record.levels.get(name).is_some_and(|l| levels.contains(l)),
-        Condition::Range { at_least, at_most } => record.factors.get(name).is_some_and(|v| {
-            at_least.is_none_or(|low| *v >= low) && at_most.is_none_or(|high| *v <= high)
-        }),
+        Condition::Range(Range { at_least, at_most }) => {
+            record.factors.get(name).is_some_and(|v| {
+                at_least.is_none_or(|low| *v >= low) && at_most.is_none_or(|high| *v <= high)
+            })
+        }
     })
 }
 

@@ -65,7 +65,7 @@ fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
 /// Computes Spearman's rank correlation; none below four pairs, or if a sample does not vary.
 ///
 /// The interval is Fisher's z with the standard error of Bonett and Wright (2000); the p value is
-/// that of Student's t with n - 2 degrees of freedom.
+/// that of Student's t with n - 2 degrees of freedom, for a perfect correlation the exact one.
 pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     let n = x.len();
     if n < 4 || y.len() != n {
@@ -79,19 +79,33 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     let freedom = n as f64 - 2.0;
     let p = match StudentsT::new(0.0, 1.0, freedom) {
         Ok(t) if r.abs() < 1.0 => 2.0 * t.sf(r.abs() * (freedom / (1.0 - r * r)).sqrt()),
-        _ => 0.0,
+        _ => perfect_rank_p(x),
     };
     Some(Estimate { n, value: r, low: (z - half_width).tanh(), high: (z + half_width).tanh(), p })
+}
+
+/// Returns the two-sided p value of a perfect rank correlation: the share of the orders of `values`
+/// that give it, in either direction.
+fn perfect_rank_p(values: &[f64]) -> f64 {
+    let ranks = ranks(values);
+    // n! over the product of the factorials of the numbers of equal values.
+    let mut orders = 1.0;
+    let mut seen: Vec<f64> = Vec::new();
+    for (n, rank) in ranks.iter().enumerate() {
+        seen.push(*rank);
+        orders *= (n + 1) as f64 / seen.iter().filter(|other| *other == rank).count() as f64;
+    }
+    2.0 / orders
 }
 
 /// Performs Wilcoxon's signed-rank test of paired differences.
 ///
 /// The value is the Hodges-Lehmann estimate, the median of all Walsh averages (pairwise means).
 /// The p value is exact given the ties. None below six differences, because no interval of fewer
-/// reaches 95 %.
+/// reaches 95 %; none if a difference is not finite.
 pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
     let n = differences.len();
-    if n < 6 {
+    if n < 6 || !differences.iter().all(|d| d.is_finite()) {
         return None;
     }
     let mut averages: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);

@@ -7,7 +7,7 @@
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_report::features::{RunFeatures, Scales};
-use grainwake_report::run_folder::{History, RunFolder};
+use grainwake_report::run_folder::{History, RunFolder, nearest_image};
 use serde::{Deserialize, Serialize};
 
 /// Measured values of a pair. The JSON names are stable.
@@ -73,13 +73,15 @@ pub struct PairHistory<'a> {
     pub events: &'a [Event],
     /// Whether the grains have a long axis.
     pub oblong: bool,
+    /// Lengths of the box along its periodic axes [m].
+    pub periods: [Option<f64>; 3],
 }
 
 impl PairMeasures {
-    /// Measures the pair of a run folder; none if the run is not a pair.
+    /// Measures the pair of a run folder; none if the run is not a pair of moving grains.
     pub fn from_run(run: &RunFolder) -> Option<PairMeasures> {
         let features = RunFeatures::of(run);
-        let [trailing, leading] = features.pair?;
+        let [trailing, leading] = features.pair.filter(|_| run.displaced().len() == 2)?;
         let oblong = [trailing, leading].iter().all(|g| {
             let facts = run.facts.grains.get(*g);
             facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
@@ -91,6 +93,7 @@ impl PairMeasures {
             scales,
             events: &run.events,
             oblong,
+            periods: run.periods(),
         });
         let landing = measures.landing_time.map(|t| t * scales.time());
         let gap = closest_gap(run, landing.unwrap_or(f64::INFINITY));
@@ -179,8 +182,10 @@ impl PairHistory<'_> {
     fn distances(&self, until: f64) -> (Option<f64>, Option<f64>) {
         let [a, b] = self.grains;
         let rows = a.time.partition_point(|t| *t <= until).min(b.len());
-        let distance =
-            |row: usize| (a.position[row] - b.position[row]).length() / self.scales.diameter;
+        let distance = |row: usize| {
+            let line = nearest_image(a.position[row] - b.position[row], self.periods);
+            line.length() / self.scales.diameter
+        };
         let closest = (0..rows).map(distance).reduce(f64::min);
         (closest, rows.checked_sub(1).map(distance))
     }

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
+use crate::error::{StudyError, read_rows};
 use crate::plan::{Plan, Run, TABLE};
 use crate::run::state::{RunState, StateKind, folder_state};
 
@@ -30,7 +31,7 @@ pub struct RunRecord {
     pub factors: BTreeMap<String, f64>,
     /// State.
     pub state: StateKind,
-    /// Reason of a failed or stale run.
+    /// Reason of a failed or stale run, or what is wrong with the files of a finished one.
     pub remark: Option<String>,
     /// Hash of the case, the end condition and the program.
     pub id: String,
@@ -39,6 +40,9 @@ pub struct RunRecord {
     /// Gravity [m/s2].
     #[serde(default)]
     pub gravity_m_per_s2: Option<[f64; 3]>,
+    /// Lengths of the box along its periodic axes [m].
+    #[serde(default, skip_serializing_if = "no_periods")]
+    pub periods_m: [Option<f64>; 3],
     /// First contact [s].
     pub kiss_time_s: Option<f64>,
     /// Number of time steps.
@@ -99,11 +103,20 @@ impl RunRecord {
         match RunFolder::open(folder) {
             Ok(run) => {
                 self.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
+                self.periods_m = run.periods();
                 self.pair = PairMeasures::from_run(&run);
                 self.settling = SettlingMeasures::from_run(&run);
+                if self.pair.is_none() && self.settling.is_none() {
+                    self.remark = run.notes.first().cloned();
+                }
             }
             Err(error) => self.remark = Some(error.to_string()),
         }
+    }
+
+    /// Returns whether the run finished, but its files could not be read.
+    fn unmeasured(&self) -> bool {
+        self.finished() && self.remark.is_some()
     }
 
     /// Returns the unit vector against gravity, and sqrt(d/g) [s].
@@ -130,25 +143,48 @@ impl RunRecord {
         of_pair.or_else(|| self.settling.as_ref()?.get(name))
     }
 
-    /// Returns whether a quantity is only a lower bound: the pair landed while still in contact.
+    /// Returns whether a quantity is only a lower bound: the pair landed, or the run ended, while
+    /// still in contact.
     pub fn is_lower_bound(&self, quantity: &str) -> bool {
-        let in_contact = self.pair.as_ref().is_some_and(|p| p.parted == Some(false));
-        quantity == "contact_stage" && in_contact
+        let Some(pair) = self.pair.as_ref().filter(|pair| pair.parted == Some(false)) else {
+            return false;
+        };
+        match quantity {
+            "contact_stage" => true,
+            "kissing_stage" => pair.tumble_time.is_none(),
+            _ => false,
+        }
     }
+}
+
+fn no_periods(periods: &[Option<f64>; 3]) -> bool {
+    periods.iter().all(Option::is_none)
 }
 
 /// Reads the records of all runs of a study.
 ///
-/// A run without a folder keeps its record in `table.json`, so that run folders may be removed.
-pub fn records(plan: &Plan, study: &Path) -> Vec<RunRecord> {
-    let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
-    let kept: Vec<RunRecord> = serde_json::from_str(&text).unwrap_or_default();
+/// A run without a folder keeps its values in `table.json`, so that run folders may be removed. So
+/// does a finished run whose files are damaged.
+///
+/// # Errors
+/// [`StudyError::Damaged`] for a damaged `table.json`.
+pub fn records(plan: &Plan, study: &Path) -> Result<Vec<RunRecord>, StudyError> {
+    let kept: Vec<RunRecord> = read_rows(&study.join(TABLE))?;
     let read = |run: &Run| {
         let record = RunRecord::read(run, study);
-        let same = |old: &RunRecord| old.name == run.name && run.ids().any(|id| *id == old.id);
-        let old = kept.iter().find(|old| same(old) && old.finished());
-        let missing = record.state == StateKind::Missing;
-        old.filter(|_| missing).cloned().unwrap_or(record)
+        let unknown = record.state == StateKind::Missing || record.unmeasured();
+        let same = |old: &&RunRecord| {
+            old.name == run.name && old.finished() && run.ids().any(|id| *id == old.id)
+        };
+        match kept.iter().find(same).filter(|_| unknown) {
+            Some(old) => RunRecord {
+                levels: record.levels,
+                factors: record.factors,
+                remark: record.remark.or_else(|| old.remark.clone()),
+                ..old.clone()
+            },
+            None => record,
+        }
     };
-    plan.runs.par_iter().map(read).collect()
+    Ok(plan.runs.par_iter().map(read).collect())
 }

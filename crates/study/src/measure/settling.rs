@@ -1,4 +1,5 @@
-//! Measured values of settling grains other than a pair: a single grain, or three and more.
+//! Measured values of settling grains other than a pair: a single grain, or three and more. Fixed
+//! grains are left out.
 //!
 //! Speeds are along gravity, down positive. All values of a grain end with its landing.
 
@@ -87,12 +88,13 @@ impl SettlingMeasures {
     pub fn from_run(run: &RunFolder) -> Option<SettlingMeasures> {
         let features = RunFeatures::of(run);
         let scales = features.scales?;
-        if features.pair.is_some() || !features.travels {
+        let moving = run.displaced();
+        if features.pair.is_some() && moving.len() == 2 || !features.travels {
             return None;
         }
         let surfaces = surfaces(run, &mut Vec::new());
-        let each: Vec<GrainSettling> = (0..run.grains.len())
-            .filter(|grain| !run.grains[*grain].is_empty())
+        let each: Vec<GrainSettling> = moving
+            .into_iter()
             .map(|grain| GrainSettling::from_run(run, grain, features.up, scales, &surfaces))
             .collect();
         Some(SettlingMeasures::summarise(each, scales))

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::record::RunRecord;
 use super::settling::GrainSettling;
-use crate::error::{At, StudyError, write_file, write_json};
+use crate::error::{At, StudyError, read_rows, write_file, write_json};
 use crate::format::rounded;
 use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
 use crate::plan::{EARLIER_TABLE, TABLE};
@@ -38,7 +38,7 @@ const SETTLING_HEADER: [&str; 15] = [
 /// the last `table.json` that the records lack are kept in `table.earlier.json`.
 ///
 /// # Errors
-/// If a file cannot be written, or `table.earlier.json` is damaged.
+/// If a file cannot be written, or a table is damaged.
 pub fn write_tables(records: &[RunRecord], study: &Path) -> Result<(), StudyError> {
     keep_finished_runs(records, study)?;
     write_json(&study.join(TABLE), &records)?;
@@ -54,8 +54,7 @@ fn keep_finished_runs(records: &[RunRecord], study: &Path) -> Result<(), StudyEr
     fn key(row: &Value) -> [Option<&str>; 2] {
         ["name", "id"].map(|key| row[key].as_str())
     }
-    let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
-    let mut lost: Vec<Value> = serde_json::from_str(&text).unwrap_or_default();
+    let mut lost: Vec<Value> = read_rows(&study.join(TABLE))?;
     let present: BTreeSet<_> =
         records.iter().map(|r| [r.name.as_str(), r.id.as_str()].map(Some)).collect();
     lost.retain(|row| row["state"] == "finished" && !present.contains(&key(row)));
@@ -63,16 +62,10 @@ fn keep_finished_runs(records: &[RunRecord], study: &Path) -> Result<(), StudyEr
         return Ok(());
     }
     let file = study.join(EARLIER_TABLE);
-    if file.exists() {
-        let text = std::fs::read_to_string(&file).at("read", &file)?;
-        let earlier: Vec<Value> =
-            serde_json::from_str(&text).map_err(std::io::Error::from).at("read", &file)?;
-        let kept =
-            earlier.into_iter().filter(|row| lost.iter().all(|other| key(other) != key(row)));
-        let kept: Vec<Value> = kept.collect();
-        lost.splice(0..0, kept);
-    }
-    write_json(&file, &lost)
+    let mut kept: Vec<Value> = read_rows(&file)?;
+    kept.retain(|row| lost.iter().all(|other| key(other) != key(row)));
+    kept.append(&mut lost);
+    write_json(&file, &kept)
 }
 
 /// Writes rows of cells as comma-separated values.
@@ -141,7 +134,7 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
         let member = r.member.to_string();
         let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.to_string()];
         cells.extend(axes.iter().map(|a| r.levels.get(*a).cloned().unwrap_or_default()));
-        cells.extend(factors.iter().map(|f| number(r.factors.get(*f).copied())));
+        cells.extend(factors.iter().map(|f| text(r.factors.get(*f), f64::to_string)));
         cells.extend(quantities.iter().map(|q| number(r.measured(q))));
         cells.push(text(r.diameter_m, |v| format!("{v:e}")));
         cells.extend(kiss.map(|_| number(r.kiss_time_s)));

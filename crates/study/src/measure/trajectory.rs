@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use grainwake_formats::disk;
-use grainwake_report::run_folder::{History, histories};
+use grainwake_report::run_folder::{History, histories, nearest_image};
 
 use super::record::RunRecord;
 use super::table::write_csv;
@@ -57,7 +57,10 @@ impl Trajectory {
             let vertical = |v: &DVec3| v.dot(up) * unit / diameter;
             h.velocity[..rows].iter().map(vertical).collect()
         };
-        let distance = |i: usize| trailing.position[i].distance(leading.position[i]) / diameter;
+        let distance = |i: usize| {
+            let line = trailing.position[i] - leading.position[i];
+            nearest_image(line, record.periods_m).length() / diameter
+        };
         Some(Trajectory {
             time: trailing.time[..rows].iter().map(|t| t / unit).collect(),
             distance: (0..rows).map(distance).collect(),
@@ -71,20 +74,23 @@ impl Trajectory {
     }
 }
 
-/// Reads the settling speed [m/s] against time [s], averaged over the grains, until all landed.
+/// Reads the settling speed [m/s] against time [s], averaged over the measured grains in the box,
+/// until all landed.
 pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec<(f64, f64)>> {
     let grains = read_histories(run, study)?;
     let (up, unit) = record.up_and_time()?;
-    let grains: Vec<&History> = grains.iter().filter(|h| !h.is_empty()).collect();
-    let landed = record.settling.as_ref().and_then(|s| s.last_landing);
+    let settling = record.settling.as_ref()?;
+    let grains: Vec<&History> =
+        settling.each.iter().filter_map(|measured| grains.get(measured.grain)).collect();
     // The row at the landing holds the speed of the rebound.
-    let until = landed.map_or(f64::INFINITY, |t| t * unit * (1.0 - 1e-6));
-    let rows = grains.iter().map(|h| h.len()).min()?;
+    let until = settling.last_landing.map_or(f64::INFINITY, |t| t * unit * (1.0 - 1e-6));
+    let longest = grains.iter().max_by_key(|h| h.len())?;
     let mean = |row: usize| {
-        let sum: f64 = grains.iter().map(|h| -h.velocity[row].dot(up)).sum();
-        sum / grains.len() as f64
+        let present = grains.iter().filter_map(|h| h.velocity.get(row));
+        let speeds: Vec<f64> = present.map(|v| -v.dot(up)).collect();
+        speeds.iter().sum::<f64>() / speeds.len() as f64
     };
-    let points = (0..rows).map(|row| (grains[0].time[row], mean(row)));
+    let points = longest.time.iter().enumerate().map(|(row, time)| (*time, mean(row)));
     Some(points.take_while(|(time, _)| *time < until).collect())
 }
 
@@ -102,15 +108,16 @@ pub fn write_thinned_history(
     };
     let interval = record.up_and_time().map_or(0.0, |(_, unit)| INTERVAL * unit);
     let mut out = vec![HEADER.map(str::to_owned).to_vec()];
-    let rows = grains.iter().map(History::len).min().unwrap_or(0);
+    // Grains that leave the box have shorter histories.
+    let times = grains.iter().map(|h| &h.time).max_by_key(|times| times.len());
+    let times = times.map_or(&[][..], Vec::as_slice);
     let mut next = f64::NEG_INFINITY;
-    for i in 0..rows {
-        let time = grains[0].time[i];
-        if time < next && i + 1 < rows {
+    for (i, time) in times.iter().copied().enumerate() {
+        if time < next && i + 1 < times.len() {
             continue;
         }
         next = time + interval * (1.0 - 1e-6);
-        for (grain, h) in grains.iter().enumerate() {
+        for (grain, h) in grains.iter().enumerate().filter(|(_, h)| i < h.len()) {
             let (x, v, w) = (h.position[i], h.velocity[i], h.angular_velocity[i]);
             let q = h.orientation[i];
             let values = [x.x, x.y, x.z, v.x, v.y, v.z, q.w, q.x, q.y, q.z, w.x, w.y, w.z];

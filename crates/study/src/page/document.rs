@@ -88,9 +88,10 @@ impl Content<'_> {
                 out.push(format!("{state}: {}", names.join(", ")));
             }
         }
-        let failed = self.records.iter().filter(|r| r.state == Failed);
+        // Files of a finished run may be damaged.
+        let ended = self.records.iter().filter(|r| r.state == Failed || r.finished());
         let reason = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
-        out.extend(failed.filter_map(reason));
+        out.extend(ended.filter_map(reason));
         out.extend(self.notes.iter().cloned());
         out
     }

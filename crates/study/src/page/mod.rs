@@ -53,7 +53,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     let mut notes: Vec<String> = damage.into_iter().collect();
     notes.extend(refresh_analysis(&mut plan, folder)?);
     let plan = plan;
-    let records = records(&plan, folder);
+    let records = records(&plan, folder)?;
     write_tables(&records, folder)?;
     let all = plan.runs.iter().zip(&records);
     let finished: Vec<(&Run, &RunRecord)> = all.filter(|(_, r)| r.finished()).collect();
@@ -131,7 +131,8 @@ fn subset(plan: &Plan, records: &[RunRecord]) -> (Plan, Vec<RunRecord>) {
     (Plan { runs, ..plan.clone() }, records)
 }
 
-/// Replaces the analysis of the plan by that of the study file, which may have changed.
+/// Replaces title, factors and analysis of the plan by those of the study file, which may have
+/// changed.
 ///
 /// A wrong analysis file is an error. If the study file is wrong otherwise, or its cases no longer
 /// exist, the analysis stays as it is, and a note is returned.
@@ -144,12 +145,16 @@ fn refresh_analysis(plan: &mut Plan, folder: &Path) -> Result<Option<String>, St
         problem.place().is_some_and(|(name, ..)| name != file)
     };
     match Study::read(&plan.study) {
-        Ok(study) if study.title == plan.title && study.analysis != plan.analysis => {
-            plan.analysis = study.analysis;
-            plan.write(folder)?;
-            Ok(None)
+        Ok(study) => {
+            let old = plan.clone();
+            for run in &mut plan.runs {
+                if let Some(model) = study.models.iter().find(|model| model.name == run.model) {
+                    run.factors.extend(model.factors.clone());
+                }
+            }
+            (plan.title, plan.analysis) = (study.title, study.analysis);
+            if *plan != old { plan.write(folder) } else { Ok(()) }.map(|()| None)
         }
-        Ok(_) => Ok(None),
         Err(StudyError::Invalid(problems)) if problems.iter().any(in_analysis_file) => {
             Err(StudyError::Invalid(problems))
         }

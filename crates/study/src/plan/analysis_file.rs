@@ -1,14 +1,13 @@
 //! The analysis file: its keys, and the check of its names against the models of the study.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use grainwake_run::case::{Located, Problem, Source};
 use serde::Deserialize;
 
 use super::claims::{
-    Analysis, Claim, Condition, Correlations, FigureRequest, Kissing, RANK_CORRELATION, Resolution,
-    Test, VerdictRule,
+    Analysis, Claim, Condition, Correlations, FigureRequest, Kissing, RANK_CORRELATION, Range,
+    Resolution, Test, VerdictRule,
 };
 use super::expand::Model;
 use super::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
@@ -42,7 +41,7 @@ struct RawClaim {
     observed: bool,
 }
 
-type Span<'a> = Option<&'a Range<usize>>;
+type Span<'a> = Option<&'a std::ops::Range<usize>>;
 
 /// Check of the names in an analysis file against the models of the study.
 struct NameCheck<'a> {
@@ -103,14 +102,33 @@ impl NameCheck<'_> {
         self.require("model", name, known, span);
     }
 
+    fn report(&mut self, message: &str, help: &str, span: Span) {
+        let problem = Problem::new(message).help(help);
+        self.problems.push(self.source.locate(problem, span, "here"));
+    }
+
+    /// Checks two levels of an axis that are to be compared.
+    fn two_levels(&mut self, axis: &str, levels: [&String; 2], span: Span) {
+        self.levels(axis, levels, span);
+        if levels[0] == levels[1] {
+            self.report("a value is compared with itself", "name two values of the axis", span);
+        }
+    }
+
     fn test(&mut self, test: &Located<Test>) {
         let span = test.span.as_ref();
+        if let Test::Equal { within, .. } | Test::Near { within, .. } = &test.value
+            && !(within.is_finite() && *within > 0.0)
+        {
+            let help = "within is the largest relative difference that counts as equal, like 0.05";
+            self.report("within must be a positive number", help, span);
+        }
         match &test.value {
             Test::Trend { with, .. } => self.factor(with, span),
             Test::Order { axis, more, less } | Test::Spread { axis, more, less } => {
-                self.levels(axis, [more, less], span);
+                self.two_levels(axis, [more, less], span);
             }
-            Test::Equal { axis, values, .. } => self.levels(axis, values, span),
+            Test::Equal { axis, values: [a, b], .. } => self.two_levels(axis, [a, b], span),
             Test::Range { over, with, .. } => {
                 self.axis(over, span);
                 self.factor(with, span);
@@ -129,21 +147,32 @@ impl NameCheck<'_> {
         let span = condition.span.as_ref();
         match &condition.value {
             Condition::Is(level) => self.levels(name, [level], span),
-            Condition::In(levels) => self.levels(name, levels, span),
-            Condition::Range { .. } => self.factor(name, span),
+            Condition::In(levels) => {
+                if levels.is_empty() {
+                    let help = "list values of the axis, or leave out the condition";
+                    self.report("no model meets a condition without values", help, span);
+                }
+                self.levels(name, levels, span);
+            }
+            Condition::Range(Range { at_least, at_most }) => {
+                let help = "give at_least, at_most, or both with at_least below at_most";
+                if at_least.is_none() && at_most.is_none() {
+                    self.report("the range has no end", help, span);
+                }
+                if at_least.zip(*at_most).is_some_and(|(low, high)| low > high) {
+                    self.report("no value lies in the range", help, span);
+                }
+                self.factor(name, span);
+            }
         }
     }
 
     fn verdicts(&mut self, rule: &VerdictRule, span: Span) {
-        let mut report = |message: &str, help: &str| {
-            let problem = Problem::new(message).help(help);
-            self.problems.push(self.source.locate(problem, span, "here"));
-        };
         if rule.false_discovery_rate.is_some_and(|rate| !(rate > 0.0 && rate < 1.0)) {
-            report("false_discovery_rate must lie between 0 and 1", "0.05 is common");
+            self.report("false_discovery_rate must lie between 0 and 1", "0.05 is common", span);
         }
         if rule.negligible.values().any(|size| !(size.is_finite() && *size > 0.0)) {
-            report("a negligible effect must be a positive number", "leave out the key");
+            self.report("a negligible effect must be a positive number", "leave out the key", span);
         }
         let known = PAIR_QUANTITIES.into_iter().chain(SETTLING_QUANTITIES);
         let known: Vec<&str> = known.chain([RANK_CORRELATION]).collect();
@@ -204,6 +233,10 @@ impl Analysis {
         if let Some(Located { value, span }) = &raw.kissing {
             for axis in [&value.by].into_iter().chain(&value.grid) {
                 check.axis(axis, span.as_ref());
+            }
+            if value.grid.as_ref() == Some(&value.by) {
+                let help = "by is the axis that is compared, grid that of the grids";
+                check.report("by and grid are the same axis", help, span.as_ref());
             }
         }
         if let Some(Located { value, span }) = &raw.resolution {

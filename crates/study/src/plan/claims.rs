@@ -147,19 +147,27 @@ pub enum Sign {
 
 /// Condition that a model must meet to be included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected a level, a list of levels, or { at_least = ..., at_most = ... }"
+)]
 pub enum Condition {
     /// Level of the axis.
     Is(String),
     /// One of several levels of the axis.
     In(Vec<String>),
-    /// Range of a factor; both ends are included.
-    Range {
-        /// Lower end.
-        at_least: Option<f64>,
-        /// Upper end.
-        at_most: Option<f64>,
-    },
+    /// Range of a factor.
+    Range(Range),
+}
+
+/// Range of a factor; both ends are included.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Lower end.
+    pub at_least: Option<f64>,
+    /// Upper end.
+    pub at_most: Option<f64>,
 }
 
 /// Rank correlations of quantities with factors, separately for each level of an axis.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use grainwake_run::case::{Located, Problem, Source};
 use toml::Value;
 
+use super::quantities::is_column;
 use super::raw::{Keys, RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
 use crate::error::did_you_mean;
 
@@ -143,6 +144,7 @@ impl Problems<'_> {
             let help = "both are columns of the table: give the factor another name";
             self.add(message, help, axis.name.span.as_ref(), "this axis");
         }
+        self.check_column("axis", name, axis.name.span.as_ref());
         if axis.values.value.is_empty() {
             let message = format!("the axis \"{name}\" has no values");
             let help = "values = [{ name = \"a\", value = ... }, ...]";
@@ -181,8 +183,23 @@ impl Problems<'_> {
         count <= MOST_RUNS
     }
 
+    /// Checks the name of an axis or factor, which becomes a column of the table.
+    fn check_column(&mut self, kind: &str, name: &str, span: Option<&Range<usize>>) {
+        if name.is_empty() || is_column(name) {
+            let message = match name {
+                "" => format!("the {kind} has no name"),
+                name => format!("the {kind} \"{name}\" has the name of a column of the table"),
+            };
+            let help = "axes, factors and results are columns of one table: choose another name";
+            self.add(message, help, span, "this name");
+        }
+    }
+
     /// Checks factors, which are numbers of the analysis.
     fn check_factors(&mut self, factors: &RawFactors) {
+        for (name, factor) in factors {
+            self.check_column("factor", name, factor.span.as_ref());
+        }
         for (name, factor) in factors.iter().filter(|(_, factor)| !factor.value.is_finite()) {
             let message = format!("the factor \"{name}\" is {}", factor.value);
             let help = "a factor is a finite number; leave it out where there is none";

@@ -43,6 +43,8 @@ pub struct Ensemble {
     pub seed: u64,
     /// Indices of the repeated models.
     pub models: Vec<usize>,
+    /// Location in the study file.
+    pub span: Option<Range<usize>>,
 }
 
 impl Study {
@@ -169,6 +171,7 @@ fn read_ensemble(
         grain: raw.grain,
         seed: raw.seed,
         models,
+        span: raw.members.span.clone(),
     })
 }
 

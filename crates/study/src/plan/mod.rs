@@ -182,7 +182,8 @@ impl Plan {
                 Err(StudyError::Damaged { .. }) if has_runs => return Ok(()),
                 Err(error) => return Err(error),
             };
-            if other.title != self.title && other.study.file_name() != self.study.file_name() {
+            // A title may be corrected, and a study file may be moved.
+            if other.title != self.title && other.study != self.study {
                 let study = other.study.display();
                 return occupied(format!("holds another study, \"{}\" of {study}", other.title));
             }

@@ -20,19 +20,29 @@ pub(crate) fn member_overrides(
     ensemble: &Ensemble,
     member: usize,
     case: &Case,
-    set: &[String],
 ) -> Result<Vec<String>, StudyError> {
     let grains = &case.setup.grains;
     let index = ensemble.grain.unwrap_or(grains.len().saturating_sub(1));
+    let refuse = |message: String, help: &str| {
+        let problem = Problem::new(message).help(help);
+        Err(study.locate(problem, ensemble.span.as_ref(), "this ensemble").into())
+    };
     let Some(grain) = grains.get(index) else {
-        let problem = Problem::new(format!(
-            "the ensemble moves grain {index}, but \"{}\" has {} grains",
+        let (name, count) = (&model.name, grains.len());
+        let message =
+            format!("the ensemble moves grain {index}, but \"{name}\" has {count} grains");
+        return refuse(message, "grains are numbered from 0");
+    };
+    let given = placed_grains(case);
+    if index >= given {
+        let message = format!(
+            "the ensemble moves grain {index}, but \"{}\" gives a position of their own to \
+             {given} of {} grains",
             model.name,
             grains.len()
-        ));
-        let problem = problem.help("grains are numbered from 0");
-        return Err(study.locate(problem, None, "").into());
-    };
+        );
+        return refuse(message, "list the grain as [[grain]], or choose such a grain by `grain`");
+    }
     let gravity = case.setup.gravity.abs();
     let vertical = if gravity.max_element() == 0.0 {
         2
@@ -46,16 +56,14 @@ pub(crate) fn member_overrides(
     offset[horizontal[1]] = ensemble.offset * draw.offset[1];
     let mut shift = DVec3::ZERO;
     if ensemble.cell_shift {
-        let given = tables_of_grains(case);
         if given != grains.len() {
-            let problem = Problem::new(format!(
+            let message = format!(
                 "cell_shift moves grains with a position of their own, but \"{}\" has {given} of \
                  {} grains",
                 model.name,
                 grains.len()
-            ));
-            let problem = problem.help("list the grains as [[grain]], or leave out cell_shift");
-            return Err(study.locate(problem, None, "").into());
+            );
+            return refuse(message, "list the grains as [[grain]], or leave out cell_shift");
         }
         shift = case.setup.mesh.spacing * draw.shift;
     }
@@ -68,7 +76,7 @@ pub(crate) fn member_overrides(
         let position = grains[moved].pose.position + shift + own;
         // A grain placed with `gap_above` has two coordinates; its height follows from the gap.
         let coordinates: Vec<String> = (0..3)
-            .filter(|axis| *axis != vertical || !has_gap_above(model, set, moved))
+            .filter(|axis| *axis != vertical || !case.gives(&format!("grain.{moved}.gap_above")))
             .map(|axis| format!("{:e}", position[axis]))
             .collect();
         format!("grain.{moved}.position=[{}]", coordinates.join(", "))
@@ -108,30 +116,11 @@ impl Draw {
     }
 }
 
-/// Returns the number of tables `[[grain]]` of a case.
-fn tables_of_grains(case: &Case) -> usize {
-    let table: toml::Table = case.resolved.parse().unwrap_or_default();
-    table.get("grain").and_then(toml::Value::as_array).map_or(0, Vec::len)
-}
-
-/// Returns whether the height of a grain follows from `gap_above`.
-fn has_gap_above(model: &Model, set: &[String], grain: usize) -> bool {
-    let text = std::fs::read_to_string(&model.base).unwrap_or_default();
-    let table: toml::Table = text.parse().unwrap_or_default();
-    let in_table = |table: &toml::Table| {
-        let grains = table.get("grain")?.as_array()?;
-        Some(grains.get(grain)?.get("gap_above").is_some())
-    };
-    let mut gap = in_table(&table).unwrap_or(false);
-    for (key, value) in set.iter().filter_map(|item| item.split_once('=')) {
-        if key.trim().starts_with(&format!("grain.{grain}.gap_above")) {
-            gap = true;
-        } else if key.trim() == "grain" {
-            let whole: Option<toml::Table> = format!("grain = {value}").parse().ok();
-            gap = whole.as_ref().and_then(in_table).unwrap_or(gap);
-        }
-    }
-    gap
+/// Returns the number of grains to which the case file gives a position; they come first.
+fn placed_grains(case: &Case) -> usize {
+    (0..case.setup.grains.len())
+        .take_while(|grain| case.gives(&format!("grain.{grain}.position")))
+        .count()
 }
 
 #[cfg(test)]

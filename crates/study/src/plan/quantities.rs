@@ -1,4 +1,5 @@
-//! Names of the measured quantities and shape factors that an analysis file may refer to.
+//! Names of the measured quantities and shape factors that an analysis file may refer to, and of
+//! the other columns of the table of a study.
 
 /// Quantities measured on a pair, in table order.
 pub const PAIR_QUANTITIES: [&str; 22] = [
@@ -48,3 +49,27 @@ pub const SETTLING_QUANTITIES: [&str; 16] = [
 
 /// Factors of every run: Krumbein sphericity and, if known, Wadell roundness of its first grain.
 pub const SHAPE_FACTORS: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
+
+/// Columns of `table.csv` that are neither axes, factors nor quantities.
+pub const OTHER_COLUMNS: [&str; 13] = [
+    "run",
+    "model",
+    "member",
+    "state",
+    "diameter_m",
+    "kiss_time_s",
+    "steps",
+    "end_time_s",
+    "wall_s",
+    "threads",
+    "max_divergence",
+    "id",
+    "remark",
+];
+
+/// Returns whether `table.csv` has a column of this name in some study.
+pub fn is_column(name: &str) -> bool {
+    PAIR_QUANTITIES.contains(&name)
+        || SETTLING_QUANTITIES.contains(&name)
+        || OTHER_COLUMNS.contains(&name)
+}

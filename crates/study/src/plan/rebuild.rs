@@ -10,7 +10,7 @@ use grainwake_run::provenance::Provenance;
 use super::claims::Analysis;
 use super::resolve::run_of_case;
 use super::{Plan, RUNS, Run, TABLE};
-use crate::error::StudyError;
+use crate::error::{StudyError, read_rows};
 
 /// Entry of `table.json`, as far as a plan needs it.
 #[derive(serde::Deserialize)]
@@ -31,14 +31,14 @@ impl Plan {
     /// the run folders and `table.json`, and a note says what is missing from it.
     ///
     /// # Errors
-    /// Those of [`Plan::read`]; a damaged file only if there is no run either.
+    /// Those of [`Plan::read`], a damaged plan only if there is no run either; a damaged table.
     pub fn read_or_rebuild(folder: &Path) -> Result<(Plan, Option<String>), StudyError> {
         let damage = match Plan::read(folder) {
             Ok(plan) => return Ok((plan, None)),
             Err(error @ StudyError::Damaged { .. }) => error,
             Err(error) => return Err(error),
         };
-        let runs = runs_in(folder);
+        let runs = runs_in(folder)?;
         if runs.is_empty() {
             return Err(damage);
         }
@@ -78,9 +78,8 @@ impl Plan {
 }
 
 /// Returns the runs with a folder or an entry in the table, by name.
-fn runs_in(folder: &Path) -> Vec<Run> {
-    let text = std::fs::read_to_string(folder.join(TABLE)).unwrap_or_default();
-    let table: Vec<Entry> = serde_json::from_str(&text).unwrap_or_default();
+fn runs_in(folder: &Path) -> Result<Vec<Run>, StudyError> {
+    let table: Vec<Entry> = read_rows(&folder.join(TABLE))?;
     let mut runs: BTreeMap<String, Run> = BTreeMap::new();
     let folders = std::fs::read_dir(folder.join(RUNS)).into_iter().flatten().flatten();
     for path in folders.map(|entry| entry.path()) {
@@ -121,7 +120,7 @@ fn runs_in(folder: &Path) -> Vec<Run> {
         (run.model, run.member, run.levels) = (model, member, levels);
         run.factors.extend(factors);
     }
-    runs.into_values().collect()
+    Ok(runs.into_values().collect())
 }
 
 /// Returns the command that started the runs, if their provenance names a study.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::expand::Model;
-use super::file::Study;
+use super::file::{Ensemble, Study};
 use super::offset::member_overrides;
 use super::quantities::SHAPE_FACTORS;
 use super::{Plan, Run};
@@ -28,6 +28,7 @@ impl Plan {
         for found in resolved {
             runs.extend(found?);
         }
+        check_names(study, &runs)?;
         let program = Provenance::new("");
         Ok(Plan {
             grainwake_study: 1,
@@ -40,6 +41,23 @@ impl Plan {
             runs,
         })
     }
+}
+
+/// Checks that no two runs share a name, and hence a folder.
+fn check_names(study: &Study, runs: &[Run]) -> Result<(), StudyError> {
+    let mut by_name = BTreeMap::new();
+    for run in runs {
+        if let Some(first) = by_name.insert(&run.name, run) {
+            let [first, second] = [first, run].map(|run| match run.member {
+                0 => format!("the model \"{}\"", run.model),
+                member => format!("member {member} of \"{}\"", run.model),
+            });
+            let message = format!("{first} and {second} are both called \"{}\"", run.name);
+            let help = "members are called MODEL-m1, MODEL-m2 ...: choose another name";
+            return Err(study.locate(Problem::new(message).help(help), None, "").into());
+        }
+    }
+    Ok(())
 }
 
 /// Returns the runs of a model: one, or the members of its ensemble.
@@ -56,9 +74,9 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
     if let Some(ensemble) = ensemble {
         for member in 1..ensemble.members {
             let mut set = set.clone();
-            let overrides = member_overrides(study, model, ensemble, member, &case, &set)?;
-            set.extend(overrides);
-            let case = load(&set)?;
+            set.extend(member_overrides(study, model, ensemble, member, &case)?);
+            let case = Case::load(&model.base, &set)
+                .map_err(|error| locate_in_ensemble(study, ensemble, model, member, error))?;
             runs.push(run(model, member, set, &case));
         }
     }
@@ -136,6 +154,26 @@ pub(crate) fn end_condition(resolved: &str) -> String {
         value.map_or("-".into(), toml::Value::to_string)
     };
     format!("end {}, stop {}", part("end"), part("stop"))
+}
+
+/// Locates the problems of a member, whose start differs from that of the model, in the ensemble.
+fn locate_in_ensemble(
+    study: &Study,
+    ensemble: &Ensemble,
+    model: &Model,
+    member: usize,
+    error: CaseError,
+) -> StudyError {
+    let CaseError::Invalid(problems) = error else {
+        return StudyError::Case(error);
+    };
+    let moved = problems.into_iter().map(|problem| {
+        let message = format!("member {member} of \"{}\": {}", model.name, problem.message);
+        let help = "the ensemble changes the start of a grain: reduce offset, turn or cell_shift";
+        let problem = Problem::new(message).help(help);
+        study.locate(problem, ensemble.span.as_ref(), "this ensemble")
+    });
+    StudyError::Invalid(moved.collect())
 }
 
 /// Locates the problems of a model's case in the study file where it sets the key.

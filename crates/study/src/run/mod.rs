@@ -74,7 +74,7 @@ pub trait StudyObserver: Sync {
 /// their last checkpoints.
 ///
 /// # Errors
-/// If threads cannot be started.
+/// If threads cannot be started, or `table.json` is damaged.
 pub fn execute(
     runs: &[Run],
     chosen: &[usize],
@@ -92,7 +92,7 @@ pub fn execute(
     let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
     let disk_full = AtomicBool::new(false);
-    let archive = Archive::read(study);
+    let archive = Archive::read(study)?;
     let work = |pool: &rayon::ThreadPool| {
         while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
             let job = Job { run: &runs[index], index, study, archive: &archive, options, observer };

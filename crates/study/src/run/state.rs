@@ -9,6 +9,7 @@ use grainwake_run::RESOLVED;
 use grainwake_run::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
+use crate::error::{StudyError, read_rows};
 use crate::plan::{Run, TABLE, end_condition};
 
 /// State of a run.
@@ -73,18 +74,20 @@ impl fmt::Display for StateKind {
 pub struct Archive(BTreeSet<(String, String)>);
 
 impl Archive {
-    /// Reads the names and hashes of the finished runs; none if the table is missing or damaged.
-    pub fn read(study: &Path) -> Archive {
+    /// Reads the names and hashes of the finished runs; none without a table.
+    ///
+    /// # Errors
+    /// [`StudyError::Damaged`] for a damaged table.
+    pub fn read(study: &Path) -> Result<Archive, StudyError> {
         #[derive(Deserialize)]
         struct Row {
             name: String,
             id: String,
             state: StateKind,
         }
-        let text = std::fs::read_to_string(study.join(TABLE)).unwrap_or_default();
-        let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
+        let rows: Vec<Row> = read_rows(&study.join(TABLE))?;
         let finished = rows.into_iter().filter(|row| row.state == StateKind::Finished);
-        Archive(finished.map(|row| (row.name, row.id)).collect())
+        Ok(Archive(finished.map(|row| (row.name, row.id)).collect()))
     }
 
     /// Returns whether the run finished with the same case and end condition, by the program of the
