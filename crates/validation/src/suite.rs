@@ -242,6 +242,16 @@ impl Builder<'_> {
             x: raw.x,
             y: raw.y,
         };
+        if raw.at_least.zip(raw.at_most).is_some_and(|(least, most)| least > most) {
+            let message = format!("\"{}\": at_least exceeds at_most", raw.quantity.value);
+            let help = "no value lies between them: exchange them";
+            return Err(problem::at(self.source, &raw.quantity, message, help, "this check"));
+        }
+        if sampling.from.zip(sampling.to).is_some_and(|(from, to)| from > to) {
+            let message = format!("\"{}\": from exceeds to", raw.quantity.value);
+            let help = "from is the begin of the range, to its end";
+            return Err(problem::at(self.source, &raw.quantity, message, help, "this check"));
+        }
         let quantity = raw.quantity.value;
         sampling.validate(raw.take.value).map_err(|message| {
             let help = "docs/reference/validation-file.md lists the keys that each `take` needs";
@@ -261,6 +271,11 @@ impl Builder<'_> {
                     })?;
                     bounds.relative = Some(percent / 100.0);
                 }
+            }
+            if bounds.absolute.or(bounds.relative).is_some_and(|bound| !(bound >= 0.0)) {
+                let message = "no value lies within a negative tolerance";
+                let help = "write the tolerance without a sign";
+                return Err(problem::at(self.source, tolerance, message, help, "here"));
             }
             if raw.reference.is_none() {
                 let help = "add `reference = ...`, or use `at_least` and `at_most`";
