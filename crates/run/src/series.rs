@@ -74,13 +74,30 @@ impl Series {
 /// Returns the time from `now` to the next output of any series or to `end` [s].
 ///
 /// Outputs that are nearly due at the same time are written together at the last of them: a time
-/// step much shorter than the usual `step` [s] disturbs the pressure.
+/// step much shorter than the usual `step` [s] disturbs the pressure. A continued run may ask for
+/// intervals shorter than the last step; two outputs of one series are never written together.
 pub(crate) fn until_next(series: &[Series], end: f64, now: f64, step: f64) -> f64 {
     let times = || {
         let next = series.iter().filter_map(Series::next_time);
         next.filter(|time| *time < end).chain([end])
     };
     let first = times().fold(f64::INFINITY, f64::min);
-    let together = first + SHORTEST_STEP * step;
+    let intervals = series.iter().filter(|series| series.is_on()).map(|series| series.interval);
+    let together = first + SHORTEST_STEP * intervals.fold(step, f64::min);
     times().filter(|time| *time <= together).fold(first, f64::max) - now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_closer_than_the_last_step_are_written_one_by_one() {
+        let of = |content, interval| Series { content, interval, next: 1 };
+        let series = [of(Content::Tables, 1e-3), of(Content::Slices, 0.5e-3)];
+        assert_eq!(until_next(&series, 1.0, 0.0, 0.1), 0.5e-3);
+        // Nearly equal times are written together.
+        let series = [of(Content::Tables, 1e-3), of(Content::Slices, 1.01e-3)];
+        assert_eq!(until_next(&series, 1.0, 0.0, 1e-3), 1.01e-3);
+    }
 }

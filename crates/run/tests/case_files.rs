@@ -939,3 +939,35 @@ fn keys_of_the_other_contact_law_are_refused_where_they_stand() {
         assert!(format!("{problem} {help}").contains(words), "{problem} {help}");
     }
 }
+
+#[test]
+fn coordinates_on_a_side_of_the_box_are_inside_in_spite_of_rounding() {
+    // 0.3 m + 30 mm is less than 330 mm by rounding.
+    let case = good(
+        r#"
+[domain]
+size = ["20 mm", "20 mm", "30 mm"]
+origin = [0, 0, "0.3 m"]
+cell_size = "5 mm"
+[fluid]
+density = 1000
+viscosity = "1 mPa s"
+[time]
+end = "1 s"
+[output]
+planes = [{ normal = "z", at = "330 mm" }]
+[[probe]]
+name = "plane"
+plane = { normal = "z", at = "330 mm" }
+[[probe]]
+name = "line"
+line = { from = [0, 0, "0.3 m"], to = [0, 0, "330 mm"], points = 4 }
+[[packing]]
+shapes = [{ kind = "sphere", diameter = "4 mm" }]
+count = 1
+density = 2500
+region = { lower = [0, 0, "0.3 m"], upper = ["20 mm", "20 mm", "330 mm"] }
+"#,
+    );
+    assert_eq!(case.setup.grains.len(), 1);
+}

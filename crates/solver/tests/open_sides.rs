@@ -252,6 +252,28 @@ fn a_floating_grain_floats_on_next_to_an_outflow() {
     }
 }
 
+/// No horizontal force acts on a box that is periodic along x and has a slip bottom: the momentum
+/// of a floating sphere that moves along x stays in the box, its part above the surface included.
+#[test]
+fn the_momentum_of_a_floating_grain_is_conserved() {
+    let mut floating = sphere(0.5, [2.0, 2.0, 3.0]);
+    floating.velocity = DVec3::new(0.1, 0.0, 0.0);
+    floating.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+    let sides = [Boundary::Slip, Boundary::FreeSurface];
+    let mut case = setup([32, 32, 24], sides, 0.02, vec![floating]);
+    case.boundaries.0[0] = [Boundary::Periodic; 2];
+    case.boundaries.0[1] = [Boundary::Periodic; 2];
+    let mut sim = Simulation::new(case).unwrap();
+    let start = sim.diagnostics().momentum.x;
+    while sim.time() < 1.0 {
+        step(&mut sim);
+    }
+    let (end, speed) = (sim.diagnostics().momentum.x, sim.grains()[0].velocity.x);
+    println!("momentum {start:.4e} to {end:.4e}, speed {speed:.3}");
+    assert!(speed < 0.08, "the grain gives momentum to the fluid: {speed}");
+    assert!((end / start - 1.0).abs() < 0.03, "{start} to {end}");
+}
+
 #[test]
 fn a_grain_of_prescribed_velocity_is_at_rest_when_it_has_left() {
     let mut moved = sphere(2.0, [2.0, 2.0, 0.7]);

@@ -206,10 +206,11 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
             format!("the unit `{unit}` in \"{text}\" cannot be read; write {}", K::EXPECTED)
         }
     })?;
-    let bare_angle = Dimension { angle: 0, ..K::DIMENSION };
-    if scale.dimension != K::DIMENSION
-        && !(K::DIMENSION.angle != 0 && scale.dimension == bare_angle)
-    {
+    // "1/s" is understood as rad/s; a frequency counts turns, and a share of 1 is no angle.
+    let bare_angle = K::DIMENSION.angle != 0
+        && scale.dimension == Dimension { angle: 0, ..K::DIMENSION }
+        && !unit.contains(['%', 'H']);
+    if scale.dimension != K::DIMENSION && !bare_angle {
         return Err(format!(
             "\"{text}\" is {}; expected {}",
             describe(scale.dimension),
@@ -279,6 +280,9 @@ mod tests {
         assert_eq!(parse_quantity::<DynamicViscosity>("1 mPa s"), Ok(1e-3));
         assert_eq!(parse_quantity::<Angle>("180 deg"), Ok(std::f64::consts::PI));
         assert_eq!(parse_quantity::<AngularVelocity>("2 1/s"), Ok(2.0));
+        // Turns per second and shares are no angles.
+        assert!(parse_quantity::<AngularVelocity>("2 Hz").is_err());
+        assert!(parse_quantity::<Angle>("50 %").is_err());
     }
 
     #[test]

@@ -172,7 +172,8 @@ pub fn parse_unit(text: &str) -> Result<Scale, UnitError> {
             divide = true;
             continue;
         }
-        if token == "1" {
+        // "1/s" has a one before the slash.
+        if token == "1" && spaced.trim_start().starts_with("1 /") && !divide {
             continue;
         }
         let (symbol, power) =
@@ -257,6 +258,7 @@ mod tests {
         assert_eq!(parse_unit("mmm").unwrap_err(), UnitError::Unknown("mmm".into()));
         assert!(parse_unit("m99").is_err());
         assert!(parse_unit("m^").is_err());
+        assert!(parse_unit("1 mm").is_err(), "a second number");
         assert!(parse_unit("m/").is_err());
     }
 }

@@ -125,6 +125,23 @@ fn projection_leaves_round_off_divergence() {
 }
 
 #[test]
+fn the_mean_pressure_is_zero() {
+    let walls = Boundaries([[Boundary::WALL; 2]; 3]);
+    let mesh =
+        Mesh { cells: [19, 14, 11], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
+    for boundaries in [PERIODIC, walls] {
+        let mut flow = random_flow(&mesh, boundaries, 0.01);
+        for _ in 0..5 {
+            flow.predict(0.01);
+            flow.project(0.01);
+        }
+        let inside = interior(&mesh).map(|[i, j, k]| flow.pressure.at(i, j, k));
+        let (sum, size) = inside.fold((0.0, 0.0), |(sum, size), p| (sum + p, size + p.abs()));
+        assert!(sum.abs() < 1e-11 * size, "{sum:e} of {size:e}");
+    }
+}
+
+#[test]
 fn advection_conserves_momentum_and_kinetic_energy() {
     let mesh = Mesh { cells: [9, 8, 7], spacing: DVec3::new(0.3, 0.4, 0.5), origin: DVec3::ZERO };
     let mut flow = random_flow(&mesh, PERIODIC, 0.0);

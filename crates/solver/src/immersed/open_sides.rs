@@ -18,7 +18,7 @@ use super::rigid_body::PreviousStep;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace};
 use crate::grid::Mesh;
-use crate::math::{Load, RigidVelocity};
+use crate::math::{Load, RigidVelocity, multiply6};
 
 /// Cells before an open side from which on a grain moves under its last hydrodynamic load.
 const MARGIN: f64 = 2.0;
@@ -120,6 +120,18 @@ impl OpenSides {
             if let (Crossing::Emerged(_), false) = (crossing, impact) {
                 previous.acceleration = previous.acceleration + (previous.acceleration - last);
             }
+        }
+    }
+
+    /// Momentum [kg m/s] that fluid of `density` [kg/m^3] in the part of a grain beyond a free
+    /// surface would have.
+    pub fn emerged_momentum(&self, index: usize, grain: &Grain, density: f64) -> DVec3 {
+        match self.crossing(index, grain, 0.0) {
+            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => {
+                let momentum = multiply6(&part.inertia, &grain.rigid_velocity().to_vector());
+                density * DVec3::from_slice(&momentum[..3])
+            }
+            _ => DVec3::ZERO,
         }
     }
 

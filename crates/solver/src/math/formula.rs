@@ -5,6 +5,8 @@ use std::sync::Arc;
 use exmex::prelude::*;
 use glam::DVec3;
 
+use super::precedence::with_brackets;
+
 /// Three formulas in the same variables.
 #[derive(Clone, Debug)]
 pub struct Formula {
@@ -36,8 +38,10 @@ impl Formula {
                     ["x", "y", "z"][axis]
                 )
             };
+            let bracketed =
+                with_brackets(formula).ok_or_else(|| wrong("it cannot be read".into()))?;
             let expression =
-                exmex::parse::<f64>(formula).map_err(|error| wrong(error.msg().to_string()))?;
+                exmex::parse::<f64>(&bracketed).map_err(|error| wrong(error.msg().to_string()))?;
             let takes = expression
                 .var_names()
                 .iter()
@@ -95,6 +99,14 @@ mod tests {
         let formula = parse(["z - 2*x", "sin(PI*y)", "0.5"], &["x", "y", "z"]).unwrap();
         let v = formula.at(&[1.0, 0.5, 10.0]);
         assert!((v - DVec3::new(8.0, 1.0, 0.5)).length() < 1e-15, "{v}");
+    }
+
+    #[test]
+    fn a_sign_binds_weaker_than_a_power() {
+        let formula = parse(["-t^2", "exp(-t^2)", "2^3^2 - 1.5e2*t"], &["t"]).unwrap();
+        let v = formula.at(&[0.5]);
+        assert!((v - DVec3::new(-0.25, (-0.25_f64).exp(), 512.0 - 75.0)).length() < 1e-12, "{v}");
+        assert!(parse(["t % 2", "0", "0"], &["t"]).unwrap_err().contains("cannot be read"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod cache;
 mod formula;
 mod pool_clock;
+mod precedence;
 mod time_spent;
 
 pub(crate) use cache::last_cache;

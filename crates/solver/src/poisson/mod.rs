@@ -82,8 +82,8 @@ impl<R: Real> Poisson<R> {
     /// Solves for the right-hand side whose plane k = 1..=nz `source` writes (rows 1..=ny, entries
     /// 1..=nx), and hands each plane of the solution to `sink` with the same plane of `fields` and
     /// its `partial` result. Where the solution is defined up to a constant, the mean of the
-    /// right-hand side must be zero, and one value of the mean mode is set to zero. The modes are
-    /// written with non-temporal stores if `non_temporal`.
+    /// right-hand side must be zero, and so is that of the solution. The modes are written with
+    /// non-temporal stores if `non_temporal`.
     pub fn solve<const N: usize, T: Send>(
         &mut self,
         non_temporal: bool,

@@ -83,6 +83,9 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
                 }
             }
         }
+        if singular {
+            system.subtract_mean(columns);
+        }
     }
 }
 
@@ -139,7 +142,7 @@ impl Tridiagonal {
             }
         }
         if singular {
-            // The last pivot of the mean mode vanishes; its last value is set to zero.
+            // The last pivot of the mean mode vanishes; its last value is zero for the time being.
             values[(n - 1) * width] = 0.0;
         }
         let carry = &mut scratch.carry[..width];
@@ -223,7 +226,17 @@ impl Tridiagonal {
         }
     }
 
-    /// Solves the mean mode of a periodic axis, whose first value is set to zero.
+    /// Makes the mean of the first column zero.
+    fn subtract_mean<R: Real>(&self, columns: &mut Columns<R>) {
+        let sum: f64 = (0..self.n).map(|k| columns.row(k)[0].wide()).sum();
+        let mean = sum / self.n as f64;
+        for k in 0..self.n {
+            let value = &mut columns.row(k)[0];
+            *value = R::of(value.wide() - mean);
+        }
+    }
+
+    /// Solves the mean mode of a periodic axis with the first value zero.
     #[inline(always)]
     fn solve_mean<R: Real>(&self, columns: &mut Columns<R>, [f, pivots]: &mut [Vec<f64>; 2]) {
         let (n, factor) = (self.n, -self.square * self.scale);

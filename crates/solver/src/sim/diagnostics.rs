@@ -10,18 +10,20 @@ use super::Simulation;
 pub struct Diagnostics {
     /// Largest |div u| after projection [1/s].
     pub max_divergence: f64,
-    /// Largest velocity magnitude on the grid [m/s].
+    /// Square root of the largest u^2 + v^2 + w^2 of a cell, with the velocities of its three lower
+    /// faces [m/s].
     pub max_velocity: f64,
     /// CFL number dt * max(sum |u_a| / h_a) of the last step.
     pub cfl: f64,
     /// Root mean square slip velocity at the surface nodes [m/s].
     pub slip: f64,
-    /// Kinetic energy of the fluid in the box [J], the fluid inside grains included.
+    /// Kinetic energy of the fluid in the box [J], the fluid inside grains included: the sum over
+    /// the lower faces of all cells.
     pub fluid_kinetic_energy: f64,
     /// Kinetic energy of the grains [J].
     pub grain_kinetic_energy: f64,
-    /// Momentum of the box [kg m/s]: fluid in all cells plus that of the grains beyond the
-    /// displaced fluid.
+    /// Momentum of the box [kg m/s]: fluid at all faces but those of the sides that are not
+    /// periodic, plus that of the grains beyond the displaced fluid.
     pub momentum: DVec3,
     /// Change of momentum of fluid, grains and walls in the last step that no force explains,
     /// relative to fluid density times box volume times the largest velocity.
@@ -42,12 +44,15 @@ impl Simulation {
         let grains = &self.setup.grains;
         let mut d = Diagnostics::default();
         let fluid_density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
-        for grain in grains {
+        for (index, grain) in grains.iter().enumerate() {
             let spin = grain.angular_velocity;
             d.grain_kinetic_energy += 0.5
                 * (grain.mass() * grain.velocity.length_squared()
                     + spin.dot(grain.inertia() * spin));
             d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
+            if let Some(open_sides) = &self.open_sides {
+                d.momentum += open_sides.emerged_momentum(index, grain, fluid_density);
+            }
         }
         if let (Some(fluid), Some(params)) = (&self.fluid, &self.setup.fluid) {
             d.max_divergence = fluid.measures().max_divergence;

@@ -1,5 +1,7 @@
 //! Collector of the problems of a case.
 
+use glam::DVec3;
+
 use crate::case::error::Problem;
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Kind, Quantity};
@@ -83,4 +85,17 @@ impl<'a> Checker<'a> {
     pub fn not_negative<K: Kind>(&mut self, value: &Located<Quantity<K>>) -> Option<f64> {
         self.within(value, 0.0, f64::INFINITY)
     }
+}
+
+/// Returns a coordinate [m] of the box, at the side if it lies beyond it by rounding only; none
+/// outside the box.
+pub(super) fn into_box(at: f64, lower: f64, upper: f64) -> Option<f64> {
+    let rounding = 1e-9 * (upper - lower);
+    (lower - rounding..=upper + rounding).contains(&at).then(|| at.clamp(lower, upper))
+}
+
+/// Returns a point of the box like [`into_box`].
+pub(super) fn point_into_box(at: DVec3, lower: DVec3, upper: DVec3) -> Option<DVec3> {
+    let along = |axis: usize| into_box(at[axis], lower[axis], upper[axis]);
+    Some(DVec3::new(along(0)?, along(1)?, along(2)?))
 }

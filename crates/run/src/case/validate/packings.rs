@@ -1,6 +1,8 @@
 //! `[[packing]]` -> raw grains.
 
-use super::check::Checker;
+use glam::DVec3;
+
+use super::check::{Checker, point_into_box};
 use super::grains::{Grains, not_too_light, shape};
 use crate::case::located::Located;
 use crate::case::packing::{Random, Region, Sphere, orientation};
@@ -45,15 +47,17 @@ pub(super) fn packing(
     let mut random = Random::seed_from_u64(raw.seed);
     let (mut packed, radii) = members(check, grains, raw, &mut random)?;
 
-    let (lower, upper) = (raw.region.as_ref())
+    let (from, to) = (raw.region.as_ref())
         .map_or((enclosure.lower, enclosure.upper), |r| (r.lower.si, r.upper.si));
     let region_span = raw.region.as_ref().map_or(&raw.span, |region| &region.span);
-    if (lower.cmplt(enclosure.lower) | upper.cmpgt(enclosure.upper) | upper.cmple(lower)).any() {
+    let corner = |at: DVec3| point_into_box(at, enclosure.lower, enclosure.upper);
+    let corners = corner(from).zip(corner(to)).filter(|(from, to)| from.cmplt(*to).all());
+    let Some((lower, upper)) = corners else {
         let (from, to) = (vector(enclosure.lower, "m"), vector(enclosure.upper, "m"));
         let message = "the region is empty or reaches out of the box";
         check.fail(region_span, message, format!("the box goes from {from} to {to}"));
         return None;
-    }
+    };
     let sphere = |centre, radius| Sphere { centre, radius };
     let taken: Vec<Sphere> = (grains.built.iter().flatten())
         .map(|grain| sphere(grain.pose.position, grain.shape.bounding_radius()))

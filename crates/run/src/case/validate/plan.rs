@@ -1,6 +1,6 @@
 //! `[time]`, `[output]` and `[run]` -> step rule and run plan.
 
-use super::check::Checker;
+use super::check::{Checker, into_box};
 use super::probes::probes;
 use super::scales::scales;
 use crate::case::located::Located;
@@ -187,12 +187,13 @@ fn plane(
     let position = match (&raw.at, &raw.grain) {
         (Some(at), None) => {
             let (lower, upper) = (mesh.origin[axis], mesh.upper()[axis]);
-            if !(lower..=upper).contains(&at.si) {
+            let found = into_box(at.si, lower, upper);
+            if found.is_none() {
                 let message = format!("{} lies outside the box", length(at.si));
                 let help = format!("between {} and {}", length(lower), length(upper));
                 check.fail(&at.span, message, help);
             }
-            PlanePosition::At(at.si)
+            PlanePosition::At(found.unwrap_or(at.si))
         }
         (None, Some(grain)) => {
             if grain.value >= grains {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::check::Checker;
+use super::check::{Checker, into_box, point_into_box};
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Length, Triple};
 use crate::case::raw::{RawLine, RawProbe, RawProbePlane};
@@ -79,13 +79,13 @@ fn place(check: &mut Checker, raw: &Located<RawProbe>, mesh: &Mesh) -> Option<Pr
 /// Returns a point of the box.
 fn inside(check: &mut Checker, point: &Located<Triple<Length>>, mesh: &Mesh) -> Option<DVec3> {
     let (lower, upper) = (mesh.origin, mesh.upper());
-    if (point.si.cmplt(lower) | point.si.cmpgt(upper)).any() {
+    let found = point_into_box(point.si, lower, upper);
+    if found.is_none() {
         let message = format!("{} lies outside the box", vector(point.si, "m"));
         let help = format!("between {} and {}", vector(lower, "m"), vector(upper, "m"));
         check.fail(&point.span, message, help);
-        return None;
     }
-    Some(point.si)
+    found
 }
 
 /// Returns whether a probe may have so many points.
@@ -121,11 +121,11 @@ fn plane_across(
         return None;
     };
     let (at, lower, upper) = (raw.at.si, mesh.origin[axis], mesh.upper()[axis]);
-    if !(lower..=upper).contains(&at) {
+    let found = into_box(at, lower, upper);
+    if found.is_none() {
         let message = format!("{} lies outside the box", length(at));
         let help = format!("between {} and {}", length(lower), length(upper));
         check.fail(&raw.at.span, message, help);
-        return None;
     }
-    Some(ProbePlace::Plane { axis, at })
+    Some(ProbePlace::Plane { axis, at: found? })
 }

@@ -15,7 +15,7 @@ mod parameters;
 mod stiffening;
 
 pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
-pub(super) use model::{ContactModel, PairKinematics};
+pub(super) use model::{ContactModel, Mobility, PairKinematics};
 pub use parameters::{ContactLawKind, ContactParams};
 
 use glam::DVec3;

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use super::law::{ContactCoefficients, ContactLaw, PairProperties};
 use super::parameters::ContactParams;
@@ -144,6 +144,8 @@ impl ContactModel {
             // The local closing speed also damps rocking on a flat face.
             let approach =
                 relative_velocity(&pair.end_of_step, point, pair.branch).dot(point.normal);
+            let damping =
+                pair.stable_damping(damping, point.lever_arm, point.normal, friction.step);
             let normal_force = self.law.normal_force(at, damping, approach);
             let mut force = -(normal_force * share * scale) * point.normal;
             if friction.stiffness > 0.0 && friction.coefficient > 0.0 {
@@ -191,11 +193,8 @@ impl ContactModel {
             * params.lubrication_viscosity
             * properties.reduced_radius.powi(2);
         let film = closest.gap.max(params.roughness).min(range);
-        let mut resistance = strength * (1.0 / film - 1.0 / range);
-        // An explicit dashpot must not reverse the approach within a sub-step.
-        if step * properties.inverse_mass > 0.0 {
-            resistance = resistance.min(0.5 / (step * properties.inverse_mass));
-        }
+        let resistance = strength * (1.0 / film - 1.0 / range);
+        let resistance = pair.stable_damping(resistance, closest.lever_arm, closest.normal, step);
         let lever_arm_b = closest.lever_arm + pair.branch;
         let [a, b] = &pair.end_of_step;
         let approach = (a.at(closest.lever_arm) - b.at(lever_arm_b)).dot(closest.normal);
@@ -245,6 +244,36 @@ pub(in crate::dem) struct PairKinematics {
     pub mid_step: [RigidVelocity; 2],
     /// Velocities expected at the end of the sub-step, for the dashpots.
     pub end_of_step: [RigidVelocity; 2],
+    /// Mobilities of both bodies.
+    pub mobility: [Mobility; 2],
+}
+
+/// Response of a body to an impulse.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::dem) struct Mobility {
+    /// Inverse mass, with added mass [1/kg].
+    pub inverse_mass: f64,
+    /// Inverse inertia about the centroid, space frame [1/(kg m^2)].
+    pub inverse_inertia: DMat3,
+}
+
+impl Mobility {
+    /// Velocity along `direction` per impulse along it, at a point with this lever arm [1/kg].
+    fn along(&self, lever_arm: DVec3, direction: DVec3) -> f64 {
+        let torque = lever_arm.cross(direction);
+        self.inverse_mass + torque.dot(self.inverse_inertia * torque)
+    }
+}
+
+impl PairKinematics {
+    /// Limits the coefficient of a dashpot [N s/m] that acts along the unit vector `direction` at a
+    /// point: within a sub-step of `step` [s], an explicit dashpot must not reverse the velocity of
+    /// the point, which follows a force at the edge of a flat grain more easily than the centroid.
+    fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3, step: f64) -> f64 {
+        let [a, b] = &self.mobility;
+        let mobility = a.along(lever_arm, direction) + b.along(lever_arm + self.branch, direction);
+        if step * mobility * damping > 0.5 { 0.5 / (step * mobility) } else { damping }
+    }
 }
 
 /// Velocity of the first body relative to the second at a contact point (Eq. 12) [m/s].
@@ -295,15 +324,18 @@ impl FrictionStep {
         let velocity = relative_velocity(&pair.mid_step, point, pair.branch);
         let displacement = earlier + self.time_in_contact * tangential(velocity);
         let sliding = relative_velocity(&pair.end_of_step, point, pair.branch);
-        let viscous = self.damping * tangential(sliding);
-        let force = -(self.stiffness * displacement + viscous);
+        let sliding = tangential(sliding);
+        let direction = sliding.normalize_or_zero();
+        let damping = pair.stable_damping(self.damping, point.lever_arm, direction, self.step);
+        let force = -(self.stiffness * displacement + damping * sliding);
         // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
         let limit = self.coefficient * normal_force.max(0.0);
         if force.length_squared() <= limit * limit {
             return (force, displacement);
         }
+        // The spring keeps the bound, so that the force follows a normal force that grows.
         let force = force * (limit / force.length());
-        (force, -(force + viscous) / self.stiffness)
+        (force, -force / self.stiffness)
     }
 }
 

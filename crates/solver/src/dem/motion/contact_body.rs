@@ -7,10 +7,11 @@ use grainwake_shape::Shape;
 
 use super::integrator::{EffectiveInertia, GrainResponse, HalfStepVelocity};
 use crate::dem::contact::{
-    BodyProperties, ContactMaterial, ContactModel, ContactRecord, PairKinematics, PairProperties,
+    BodyProperties, ContactMaterial, ContactModel, ContactRecord, Mobility, PairKinematics,
+    PairProperties,
 };
 use crate::dem::enclosure::{Enclosure, PairKey, Partner, Side};
-use crate::dem::grain::Grain;
+use crate::dem::grain::{Grain, MotionConstraint};
 use crate::dem::material::Material;
 use crate::dem::search::{NodeTree, PosedShape};
 use crate::math::{Load, RigidVelocity};
@@ -141,6 +142,18 @@ impl ContactBody {
         }
     }
 
+    /// Response to an impulse; zero where the motion is prescribed.
+    fn mobility(&self, grain: &Grain) -> Mobility {
+        let inverse_inertia = match grain.rotation {
+            MotionConstraint::Free => {
+                let moments = DMat3::from_diagonal(grain.principal_inertia().recip());
+                self.rotation * moments * self.rotation.transpose()
+            }
+            MotionConstraint::Prescribed(_) => DMat3::ZERO,
+        };
+        Mobility { inverse_mass: self.inverse_mass, inverse_inertia }
+    }
+
     fn posed_shape(&self, position: DVec3) -> PosedShape<'_> {
         PosedShape { shape: &self.shape, tree: &self.tree, rotation: self.rotation, position }
     }
@@ -188,6 +201,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
         branch: DVec3::ZERO,
         mid_step: [bodies[i].mid_step, RigidVelocity::default()],
         end_of_step: [bodies[i].end_of_step, RigidVelocity::default()],
+        mobility: [bodies[i].mobility(&grains[i]), Mobility::default()],
     };
     let params = &context.model.params;
     let (friction, closest) = match record.key.partner {
@@ -197,6 +211,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
             pair.branch = a.position - b.position;
             pair.mid_step[1] = bodies[j].mid_step;
             pair.end_of_step[1] = bodies[j].end_of_step;
+            pair.mobility[1] = bodies[j].mobility(&grains[j]);
             (params.friction, record.patch.find_grain_contact(&a, &b, reach))
         }
         Partner::Wall { axis, side } => {
