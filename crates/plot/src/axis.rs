@@ -7,6 +7,8 @@ pub enum Scale {
     Linear,
     /// Logarithmic, base 10.
     Log,
+    /// Linear, with names of categories at the ticks.
+    Categories,
 }
 
 /// End values of an axis.
@@ -167,6 +169,22 @@ impl Axis {
         }
     }
 
+    /// Creates an axis of categories at 0.5, 1.5 ..., with their names in label markup.
+    pub fn categories(label: &str, names: Vec<String>) -> Axis {
+        Axis {
+            label: label.to_owned(),
+            scale: Scale::Categories,
+            low: 0.0,
+            high: names.len().max(1) as f64,
+            ticks: names.into_iter().enumerate().map(|(i, name)| (i as f64 + 0.5, name)).collect(),
+        }
+    }
+
+    /// Returns whether the ticks are categories.
+    pub fn has_categories(&self) -> bool {
+        self.scale == Scale::Categories
+    }
+
     /// Replaces the ticks by ticks at `values`.
     #[must_use]
     pub fn with_ticks(mut self, values: &[f64]) -> Axis {
@@ -188,7 +206,7 @@ impl Axis {
     /// `None` if the axis cannot represent it.
     pub fn fraction(&self, value: f64) -> Option<f64> {
         let fraction = match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Linear | Scale::Categories => (value - self.low) / (self.high - self.low),
             Scale::Log if value > 0.0 => {
                 (value / self.low).log10() / (self.high / self.low).log10()
             }

@@ -124,6 +124,12 @@ impl Drawing {
         self.label(at, anchor, style::TEXT, style::INK, label);
     }
 
+    /// Adds a small label that runs upwards and ends at `(x, y)` [pt], horizontally centred.
+    pub fn upward_note(&mut self, (x, y): (f64, f64), label: &str) {
+        let base = (x + 0.36 * style::SMALL, y);
+        self.turned_label(base, Anchor::End, style::SMALL, style::INK, label);
+    }
+
     /// Adds a label of text size that runs upwards; the middle of its baseline is at `(x, y)` [pt].
     pub fn upward_text(&mut self, at: (f64, f64), label: &str) {
         self.upward_label(at, style::TEXT, style::INK, label);
@@ -142,10 +148,21 @@ impl Drawing {
     }
 
     /// Adds a label that runs upwards, with the middle of its baseline at `(x, y)` [pt].
-    pub fn upward_label(&mut self, (x, y): (f64, f64), size: f64, colour: &str, label: &str) {
+    pub fn upward_label(&mut self, at: (f64, f64), size: f64, colour: &str, label: &str) {
+        self.turned_label(at, Anchor::Middle, size, colour, label);
+    }
+
+    fn turned_label(
+        &mut self,
+        (x, y): (f64, f64),
+        anchor: Anchor,
+        size: f64,
+        colour: &str,
+        label: &str,
+    ) {
         let turn = format!("rotate(-90 {} {})", number(x), number(y));
         let style = format!("fill=\"{colour}\" transform=\"{turn}\"");
-        self.styled_label((x, y), Anchor::Middle, size, &style, label);
+        self.styled_label((x, y), anchor, size, &style, label);
     }
 
     /// Adds a small label with a white halo, legible over colours; baseline at `(x, y)` [pt].

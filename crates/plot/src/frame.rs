@@ -3,7 +3,7 @@
 use crate::axis::Axis;
 use crate::curve;
 use crate::drawing::{Anchor, Drawing, path_data};
-use crate::style::{FAINT, GRID, LINE, SMALL, TICK};
+use crate::style::{FAINT, GRID, LINE, TICK};
 use crate::ticks;
 
 /// A rectangle on paper with a horizontal and a vertical axis.
@@ -66,9 +66,14 @@ impl Frame {
         }
     }
 
+    /// Returns the height of the tick labels and the label below the frame [pt].
+    pub fn foot(&self) -> f64 {
+        TICK + ticks::height(&self.across, self.width) + 17.0
+    }
+
     /// Draws the label of the horizontal axis below its tick labels.
     pub fn horizontal_label(&self, drawing: &mut Drawing) {
-        let base = self.y + self.height + TICK + SMALL + 11.0;
+        let base = self.y + self.height + TICK + ticks::height(&self.across, self.width) + 11.0;
         let middle = self.x + 0.5 * self.width;
         drawing.text((middle, base), Anchor::Middle, &self.across.label);
     }

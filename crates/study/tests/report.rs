@@ -203,9 +203,13 @@ fn a_complete_study_has_all_figures() {
     let kept = |name: &str| std::fs::read(folder.join(name)).unwrap();
     let (table, analysis) = (kept("table.csv"), kept("analysis.json"));
     std::fs::rename(folder.join(RUNS), root.join("elsewhere")).unwrap();
+    let history = |name: &str| folder.join("histories").join(format!("{name}.csv"));
+    std::fs::remove_file(history("g05-o3")).unwrap();
     let again = render(&folder).unwrap();
     std::fs::rename(root.join("elsewhere"), folder.join(RUNS)).unwrap();
     assert_eq!((table, analysis), (kept("table.csv"), kept("analysis.json")));
+    let note = "the figures of distance and velocity lack runs without history: g05-o3";
+    assert!(again.notes.contains(&note.to_owned()), "{:?}", again.notes);
     let drawn = names(&again);
     assert!(drawn.contains(&"fig15-gap-by-row".into()) && !drawn.contains(&"fig08-g04-o1".into()));
 }
@@ -264,6 +268,7 @@ fn an_incomplete_study_is_drawn_and_missing_runs_are_listed() {
         "unfinished: g06-o3",
         "g01-o1: it blew up",
         "there is no run sphere",
+        "the figures of distance and velocity lack unfinished runs: g02-o3, ",
         "too few for a test",
     ] {
         assert!(page.contains(part), "{part}");

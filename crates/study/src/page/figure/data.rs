@@ -3,19 +3,25 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::frame::{Fill, Marker};
+use grainwake_plot::frame::Fill;
 use grainwake_plot::legend::Entry;
-use grainwake_plot::text;
+use grainwake_plot::style::{SMALL, TEXT};
+use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
+use super::legend::LineStyle;
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
 use crate::analysis::verdict::Finding;
+use crate::format::title;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::{Plan, Run};
+
+/// Smallest number of significant digits of a value with decimals.
+const DIGITS: usize = 3;
 
 /// Data of the figures.
 pub struct FigureData<'a> {
@@ -68,6 +74,41 @@ impl FigureData<'_> {
         out.dedup();
         out
     }
+
+    /// Returns a factor's value with as many digits as distinguish it from the others.
+    pub fn factor_value(&self, factor: &str, value: f64) -> String {
+        let values = self.factor_values(factor);
+        let distinct = |digits: &usize| {
+            values.windows(2).all(|w| rounded_text(w[0], *digits) != rounded_text(w[1], *digits))
+        };
+        rounded_text(value, (DIGITS..16).find(distinct).unwrap_or(16))
+    }
+
+    /// Returns the label "S = 0.45" of a factor's value.
+    pub fn factor_label(&self, factor: &str, value: f64) -> String {
+        format!("{} = {}", self.symbol(factor), self.factor_value(factor, value))
+    }
+
+    /// Returns the label of a factor's value, or the value alone if the label is wider than `width`
+    /// [pt].
+    pub fn fitting_label(&self, factor: &str, value: f64, width: f64) -> String {
+        let label = self.factor_label(factor, value);
+        if text::width(&label, TEXT) <= width { label } else { self.factor_value(factor, value) }
+    }
+
+    /// Returns the symbol of a factor of rows or columns: its first letter in italics; its name if
+    /// both factors begin with that letter.
+    fn symbol(&self, factor: &str) -> String {
+        let initial = |name: &str| name.chars().next().map(|c| c.to_uppercase().to_string());
+        let request = &self.plan.analysis.figures;
+        let mut others = [&request.rows, &request.columns].into_iter().flatten();
+        match initial(factor) {
+            Some(own) if !others.any(|o| o != factor && initial(o).as_ref() == Some(&own)) => {
+                format!("*{own}*")
+            }
+            _ => text::literal(&title(factor)),
+        }
+    }
 }
 
 /// Returns the distinct names, in order of first appearance.
@@ -81,36 +122,122 @@ pub fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
     out
 }
 
-/// Returns whether the study shows grains, orientations and set-up as the paper's first figures.
-pub fn numbered_as_in_paper(data: &FigureData) -> bool {
-    let request = &data.plan.analysis.figures;
-    request.grains.is_some() && request.orientations.is_some() && request.setup.is_some()
-}
-
-/// Symbol of a factor in labels: its first letter in italics.
-fn symbol(factor: &str) -> String {
-    let first = factor.chars().next();
-    first.map_or(String::new(), |c| format!("*{}*", c.to_uppercase()))
-}
-
-/// Value with at most three decimals, without trailing zeros, but "0.40" with two.
+/// Value with at most three decimals, or three significant digits if it is small.
 pub fn value_text(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.contains('.') && text.len() == 3 { format!("{text}0") } else { text.to_owned() }
+    rounded_text(value, DIGITS)
 }
 
-/// Label "S = 0.45" of a factor's value.
-pub fn factor_label(factor: &str, value: f64) -> String {
-    format!("{} = {}", symbol(factor), value_text(value))
+/// Value with at most `digits` decimals, or as many significant digits below 0.1, without trailing
+/// zeros, but "0.40" with two decimals. Very small and large values have a power of ten.
+fn rounded_text(value: f64, digits: usize) -> String {
+    let trimmed = |text: &str| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text.to_owned(),
+    };
+    let size = value.abs();
+    if size != 0.0 && !(1e-4..1e7).contains(&size) {
+        let text = format!("{value:.*e}", digits - 1);
+        let (factor, power) = text.split_once('e').unwrap_or((&text, "0"));
+        return minus(&format!("{}·10^{{{power}}}", trimmed(factor)));
+    }
+    let leading_zeros =
+        if size < 0.1 && size > 0.0 { -size.log10().floor() as usize - 1 } else { 0 };
+    let text = trimmed(&format!("{value:.*}", digits + leading_zeros));
+    minus(&if text.contains('.') && text.len() == 3 { format!("{text}0") } else { text })
+}
+
+/// Returns a name as a small label of at most `width` [pt]; a long one lacks its middle.
+pub fn fitting_name(name: &str, width: f64) -> String {
+    let all: Vec<char> = name.chars().collect();
+    let shortened = |kept: usize| {
+        let head: String = all[..kept.div_ceil(2)].iter().collect();
+        let tail: String = all[all.len() - kept / 2..].iter().collect();
+        if kept == all.len() {
+            text::literal(name)
+        } else {
+            text::literal(&format!("{head}…{tail}"))
+        }
+    };
+    let mut labels = (0..=all.len()).rev().map(shortened);
+    labels.find(|label| text::width(label, SMALL) <= width).unwrap_or_default()
 }
 
 /// Returns the entry of a legend with a symbol.
-pub fn symbol_entry(name: &str, n: usize, colour: &'static str) -> Entry {
+pub fn symbol_entry(name: &str, style: LineStyle) -> Entry {
     Entry {
         name: text::literal(name),
-        colour,
+        colour: style.colour,
         line: None,
-        symbol: Some((Marker::nth(n), Fill::Solid)),
+        symbol: Some((style.sign, Fill::Solid)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_few_digits_but_enough() {
+        let texts = [0.0, 0.4, 0.45, 2.0, 1400.0, 0.0123, 0.0001].map(value_text);
+        assert_eq!(texts, ["0", "0.40", "0.45", "2", "1400", "0.0123", "0.0001"]);
+        assert_eq!([-0.25, 1.5e-12, 2e9].map(value_text), ["−0.25", "1.5·10^{−12}", "2·10^{9}"]);
+    }
+
+    #[test]
+    fn long_names_lack_their_middle() {
+        assert_eq!(fitting_name("g_01", 60.0), "g\\_01");
+        let label = fitting_name("sphere-number-12-of-a-long-name", 60.0);
+        assert!(label.starts_with("sphere-") && label.ends_with("-name"), "{label}");
+        assert!(label.contains('…') && text::width(&label, SMALL) <= 60.0);
+        assert_eq!(fitting_name("g", 0.0), "");
+    }
+
+    /// Data of a plan with models of the given values of two factors.
+    fn with_data<T>(factors: [&str; 2], values: &[f64], check: impl Fn(&FigureData) -> T) -> T {
+        let run = |value: &f64| {
+            let factors: BTreeMap<&str, f64> = factors.map(|factor| (factor, *value)).into();
+            serde_json::json!({
+                "name": "m", "model": "m", "member": 0, "levels": { "grain": "g" },
+                "factors": factors, "base": "case.toml", "set": [], "id": "0",
+                "case_sha256": "0", "ending": "", "end_s": 1.0, "memory_bytes": 0,
+                "wall_s": 0.0,
+            })
+        };
+        let plan = serde_json::json!({
+            "grainwake_study": 1, "study": "study.toml", "title": "t", "version": "0",
+            "commit": null, "runs": values.iter().map(run).collect::<Vec<_>>(),
+            "analysis": { "figures": { "rows": factors[0], "columns": factors[1] } },
+        });
+        check(&FigureData {
+            plan: &serde_json::from_value(plan).unwrap(),
+            records: &[],
+            folder: Path::new(""),
+            findings: &[],
+            correlations: &[],
+            factor_means: &[],
+            kissing: None,
+            trajectories: BTreeMap::new(),
+        })
+    }
+
+    #[test]
+    fn labels_distinguish_close_values() {
+        let labels = |values: &[f64]| {
+            with_data(["sphericity", "roundness"], values, |data| {
+                values.iter().map(|v| data.factor_label("roundness", *v)).collect::<Vec<_>>()
+            })
+        };
+        assert_eq!(labels(&[0.0001, 0.0002]), ["*R* = 0.0001", "*R* = 0.0002"]);
+        assert_eq!(labels(&[0.4, 0.45]), ["*R* = 0.40", "*R* = 0.45"]);
+        assert_eq!(labels(&[1.00001, 1.00002, 3.0]), ["*R* = 1.00001", "*R* = 1.00002", "*R* = 3"]);
+    }
+
+    #[test]
+    fn factors_with_the_same_initial_are_named() {
+        with_data(["density", "Diameter_mm"], &[2.0], |data| {
+            assert_eq!(data.factor_label("density", 2.0), "density = 2");
+            assert_eq!(data.factor_label("Diameter_mm", 2.0), "Diameter mm = 2");
+            assert_eq!(data.fitting_label("density", 2.0, 20.0), "2");
+        });
     }
 }

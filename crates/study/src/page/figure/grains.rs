@@ -9,7 +9,7 @@ use grainwake_shape::Shape;
 use grainwake_shape::render::{Picture, View};
 use grainwake_solver::dem::Grain;
 
-use super::data::{FigureData, factor_label, value_text};
+use super::data::{FigureData, fitting_name, value_text};
 use crate::plan::Run;
 
 /// Pixels of a picture per point of the page.
@@ -18,6 +18,12 @@ const PIXELS: f64 = 2.5;
 const STONE: [f64; 3] = [222.0, 200.0, 165.0];
 /// Brightness of the silhouette's rim, which blends into the page.
 const RIM: f64 = 0.4;
+/// Height of the name below a picture in the figure of all grains [pt].
+const NAME: f64 = 10.0;
+/// Largest width of a picture in the figure of all grains [pt].
+const LARGEST: f64 = (PAGE - LEFT) / 4.0;
+/// Left edge of the pictures of all grains [pt].
+const LEFT: f64 = 44.0;
 
 /// First grain of a run's case.
 fn first_grain(data: &FigureData, run: &Run) -> Option<Grain> {
@@ -42,34 +48,36 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
         match first_grain(data, run) {
             Some(grain) => found.push((name, row, column, grain)),
             None => notes
-                .push(format!("figure 4 lacks {name}: neither its run nor its case can be read")),
+                .push(format!("the figure of the grains lacks {name}: its case cannot be read")),
         }
     }
     let radii = found.iter().map(|f| f.3.shape.bounding_radius());
     let window = 2.04 * radii.reduce(f64::max)?;
-    let (left, top) = (44.0, 16.0);
-    let cell = (PAGE - left) / across.len().max(1) as f64;
-    let row_height = 0.62 * cell;
-    let bottom = top + row_height * down.len() as f64;
-    let mut drawing = Drawing::new(PAGE, bottom + 22.0);
+    let (left, top) = (LEFT, 16.0);
+    let cell = LARGEST.min((PAGE - left) / across.len().max(1) as f64);
     // Seen slightly from above and from the side, so that the third dimension shows.
     let rotation = (DQuat::from_rotation_x(-0.45) * DQuat::from_rotation_y(0.35)).conjugate();
     let view = View { right: rotation * DVec3::X, up: rotation * DVec3::Y };
-    for (name, row, column, grain) in &found {
+    let pictures = found.iter().map(|found| rendered(&found.3.shape, view, window, cell));
+    let pictures: Vec<Picture> = pictures.collect();
+    let row_height = row_height(&pictures, cell);
+    let bottom = top + row_height * down.len() as f64;
+    let mut drawing = Drawing::new(PAGE, bottom + 22.0);
+    for ((name, row, column, _), picture) in found.iter().zip(&pictures) {
         let (x, y) = (left + cell * *column as f64, top + row_height * *row as f64);
-        let height = row_height - 10.0;
-        let picture = picture(&grain.shape, view, window, (cell, height));
-        drawing.raster(x, y, cell, height, picture);
+        let height = cell.min(row_height - NAME);
+        drawing.raster(x, y, cell, height, cropped(picture, height));
         let base = y + row_height - 4.0 - 0.36 * SMALL;
         let place = (x + 0.5 * cell, base);
-        drawing.note(place, Anchor::Middle, &text::literal(name));
+        drawing.note(place, Anchor::Middle, &fitting_name(name, cell - 4.0));
     }
     for (n, value) in across.iter().enumerate() {
         let place = (left + cell * (n as f64 + 0.5), 9.0);
-        drawing.text(place, Anchor::Middle, &factor_label(columns, *value));
+        let label = data.fitting_label(columns, *value, cell - 4.0);
+        drawing.text(place, Anchor::Middle, &label);
     }
     for (n, value) in down.iter().enumerate() {
-        let label = factor_label(rows, *value);
+        let label = data.fitting_label(rows, *value, row_height - 4.0);
         let y = top + row_height * (n as f64 + 0.45);
         drawing.upward_text((12.0, y), &label);
     }
@@ -99,15 +107,18 @@ pub fn orientations(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure
         let run = runs
             .find(|r| r.levels.get(grains) == Some(oriented) && r.levels.get(axis) == Some(name));
         let Some(grain) = run.and_then(|run| first_grain(data, run)) else {
-            notes.push(format!("figure 5 lacks {oriented} in {name}: its case cannot be read"));
+            notes.push(format!(
+                "the figure of the initial orientations lacks {oriented} in {name}: its case \
+                 cannot be read"
+            ));
             continue;
         };
         let rotation = grain.pose.orientation.conjugate();
         let view = View { right: rotation * DVec3::X, up: rotation * DVec3::Z };
         let window = 2.3 * grain.shape.bounding_radius();
         let x = cell * n as f64;
-        let picture = picture(&grain.shape, view, window, (cell, cell));
-        drawing.raster(x, 12.0, cell, cell, picture);
+        let picture = rendered(&grain.shape, view, window, cell);
+        drawing.raster(x, 12.0, cell, cell, cropped(&picture, cell));
         let label = format!("{}  {}", letter(n), text::literal(name));
         drawing.text((x + 6.0, 9.0), Anchor::Start, &label);
         drawn += 1;
@@ -154,15 +165,32 @@ fn scale_bar(drawing: &mut Drawing, (x, y): (f64, f64), scale: f64, length: f64)
     drawing.note((end + 5.0, y), Anchor::Start, &label);
 }
 
-/// Renders a shape in a window [m] of the given width, cropped to the size [pt] around its middle.
-fn picture(shape: &Shape, view: View, window: f64, (width, height): (f64, f64)) -> Raster {
-    let pixels = (PIXELS * width) as usize;
-    let picture = Picture::of(shape, view, pixels, window, false);
-    let rows = ((PIXELS * height) as usize).min(pixels);
-    let from = (pixels - rows) / 2;
-    let kept = &picture.pixels[from * pixels..(from + rows) * pixels];
+/// Renders a shape in a square window [m] that is drawn `width` [pt] wide.
+fn rendered(shape: &Shape, view: View, window: f64, width: f64) -> Picture {
+    Picture::of(shape, view, (PIXELS * width) as usize, window, false)
+}
+
+/// Height [pt] of a row of pictures `width` [pt] wide and their names, in which no grain is cut.
+fn row_height(pictures: &[Picture], width: f64) -> f64 {
+    let tallest = pictures.iter().map(height).fold(0.0, f64::max);
+    (0.62 * width).max(tallest + 2.0 + NAME)
+}
+
+/// Height [pt] that a picture needs around its middle so that no grain is cut.
+fn height(picture: &Picture) -> f64 {
+    let rows = picture.pixels.chunks(picture.width);
+    let inked = rows.enumerate().filter(|(_, row)| row.iter().any(|pixel| *pixel != [255; 3]));
+    let from_middle = inked.map(|(i, _)| (i + 1).max(picture.height - i));
+    from_middle.max().map_or(0.0, |rows| (2 * rows - picture.height) as f64 / PIXELS)
+}
+
+/// Crops a picture to a height [pt] around its middle.
+fn cropped(picture: &Picture, height: f64) -> Raster {
+    let rows = ((PIXELS * height) as usize).min(picture.height);
+    let from = (picture.height - rows) / 2;
+    let kept = &picture.pixels[from * picture.width..(from + rows) * picture.width];
     Raster {
-        width: pixels,
+        width: picture.width,
         height: rows,
         pixels: kept.iter().map(|p| index(*p)).collect(),
         palette: palette(),
@@ -192,6 +220,19 @@ fn index(pixel: [u8; 3]) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sphere_is_not_cut() {
+        let sphere = Shape::sphere(1e-3, 100);
+        let picture = rendered(&sphere, View::BROAD, 2.04 * sphere.bounding_radius(), 60.0);
+        let tall = height(&picture);
+        assert!((57.0..=60.0).contains(&tall), "{tall}");
+        let row = row_height(std::slice::from_ref(&picture), 60.0);
+        let raster = cropped(&picture, row - NAME);
+        let page = index([255; 3]);
+        let edges = [&raster.pixels[..raster.width], &raster.pixels[raster.pixels.len() - 60..]];
+        assert!(edges.iter().all(|row| row.iter().all(|pixel| *pixel == page)));
+    }
 
     #[test]
     fn palette_colours_approximate_the_picture() {

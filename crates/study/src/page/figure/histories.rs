@@ -4,14 +4,17 @@ use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
+use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, SKY, VERMILION};
 use grainwake_plot::{Figure, letter, text};
 
-use super::data::{FigureData, factor_label};
+use super::data::FigureData;
 use crate::measure::trajectory::Trajectory;
 use crate::plan::Run;
 
-const COLOURS: [&str; 4] = [BLUE, GREEN, ORANGE, VERMILION];
+/// Colours of up to four values in ascending order.
+const FOUR: [&str; 4] = [BLUE, GREEN, ORANGE, VERMILION];
+/// Colours of more values in ascending order.
+const EIGHT: [&str; 8] = ["#5e3c99", BLUE, SKY, GREEN, "#9aa61f", ORANGE, VERMILION, "#7f1d3f"];
 const TIME: &str = "*t* √(*g*/*d*)  [–]";
 const LEFT: f64 = 40.0;
 const GAP: f64 = 20.0;
@@ -19,8 +22,8 @@ const WIDTH: f64 = (PAGE - LEFT - GAP - 8.0) / 2.0;
 const HEIGHT: f64 = 128.0;
 /// Height of the title above a panel [pt].
 const TITLE: f64 = 20.0;
-/// Height of the legend above the panels [pt].
-const LEGEND: f64 = 16.0;
+/// Space between the legend and the titles of the first panels [pt].
+const SPACE: f64 = 6.5;
 /// Width of the lines of further members of an ensemble [pt].
 const THIN: f64 = 0.45;
 /// Dashes of the trailing grain.
@@ -51,11 +54,15 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
     };
     let compared = data.plan.runs.iter().filter(|run| run.levels.get(axis) == Some(level));
     let (wanted, members): (Vec<&Run>, Vec<&Run>) = compared.partition(|run| run.member == 0);
-    let missing = wanted.iter().filter(|r| !data.trajectories.contains_key(&r.name));
-    let missing: Vec<&str> = missing.map(|r| r.name.as_str()).collect();
-    if !missing.is_empty() {
-        let names = missing.join(", ");
-        notes.push(format!("figures 15 to 18 lack unfinished runs: {names}"));
+    let missing = wanted.iter().copied().filter(|r| !data.trajectories.contains_key(&r.name));
+    let finished = |run: &&Run| data.records.iter().any(|r| r.name == run.name && r.finished());
+    let (no_history, unfinished): (Vec<&Run>, Vec<&Run>) = missing.partition(finished);
+    for (reason, runs) in [("unfinished runs", unfinished), ("runs without history", no_history)] {
+        let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+        if !names.is_empty() {
+            let names = names.join(", ");
+            notes.push(format!("the figures of distance and velocity lack {reason}: {names}"));
+        }
     }
     let layouts = [
         ("15", Curve::Gap, rows, columns),
@@ -98,22 +105,25 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
         }
     };
     let panels = data.factor_values(by);
-    let lines = data.factor_values(within);
+    let values = data.factor_values(within);
+    let legend = legend(data, layout, reference.map(|(name, _)| name.as_str()), &values);
+    let top = legend.height() + SPACE;
     let rows = panels.len().div_ceil(2);
-    let height = LEGEND + rows as f64 * (HEIGHT + TITLE) + 26.0 + 8.0;
+    let height = top + rows as f64 * (HEIGHT + TITLE) + 26.0 + 8.0;
     let mut drawing = Drawing::new(PAGE, height);
+    legend.draw(&mut drawing, (LEFT, 8.0));
     for (i, value) in panels.iter().enumerate() {
         let (column, row) = (i % 2, i / 2);
         let frame = Frame {
             x: LEFT + column as f64 * (WIDTH + GAP),
-            y: LEGEND + TITLE + row as f64 * (HEIGHT + TITLE),
+            y: top + TITLE + row as f64 * (HEIGHT + TITLE),
             width: WIDTH,
             height: HEIGHT,
             across: Axis::linear(TIME, 0.0, end, 6, AxisRange::Tight),
             up: Axis::linear(label, low, high.max(0.0), 5, AxisRange::Rounded),
         };
         frame.grid(&mut drawing);
-        let title = format!("{}  {}", letter(i), factor_label(by, *value));
+        let title = format!("{}  {}", letter(i), data.factor_label(by, *value));
         drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
         let mut draw = |t: &Trajectory, colour: &str, name: &str| {
             let clip = format!("clip-{i}-{name}");
@@ -132,18 +142,18 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
             draw(trajectory, INK, "sphere");
         }
         let here = |(run, _): &&(&Run, &Trajectory)| run.factors.get(by) == Some(value);
-        let colour = |run: &Run| {
+        let colour_of = |run: &Run| {
             let own = run.factors.get(within);
-            let n = lines.iter().position(|v| own == Some(v)).unwrap_or(0);
-            COLOURS[n % 4]
+            let n = values.iter().position(|v| own == Some(v)).unwrap_or(0);
+            colour(n, values.len())
         };
         for (run, trajectory) in shown.iter().filter(here) {
-            draw(trajectory, colour(run), &run.name);
+            draw(trajectory, colour_of(run), &run.name);
         }
         for (run, t) in members.iter().filter(here) {
             let mut thin = |values: &[f64], dash| {
                 let points = t.points(values).into_iter().filter_map(|point| frame.position(point));
-                drawing.line(&points.collect::<Vec<_>>(), colour(run), THIN, dash);
+                drawing.line(&points.collect::<Vec<_>>(), colour_of(run), THIN, dash);
             };
             match curve {
                 Curve::Gap => thin(&t.distance, None),
@@ -155,26 +165,6 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
         }
         frame.outline(&mut drawing, Labelled { across: row + 1 == rows, up: column == 0 });
     }
-    let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
-        name,
-        colour,
-        line: Some(dash.unwrap_or_default()),
-        symbol: None,
-    };
-    let mut entries: Vec<Entry> = lines
-        .iter()
-        .enumerate()
-        .map(|(n, v)| entry(factor_label(within, *v), COLOURS[n % 4], None))
-        .collect();
-    match (curve, reference) {
-        (Curve::Velocity, _) => {
-            entries.push(entry("leading".to_owned(), INK, None));
-            entries.push(entry("trailing".to_owned(), INK, DASHED));
-        }
-        (Curve::Gap, Some((name, _))) => entries.push(entry(text::literal(name), INK, None)),
-        (Curve::Gap, None) => {}
-    }
-    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND - 8.0));
     let (quantity, file) = match curve {
         Curve::Gap => ("Distance of the centres", "gap"),
         Curve::Velocity => ("Vertical velocity", "velocity"),
@@ -191,10 +181,71 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
         caption += " Thin lines: further members of the ensemble.";
     }
     if shown.len() < runs[0].len() {
-        caption += &format!(" {} of {} runs are finished.", shown.len(), runs[0].len());
+        caption += &format!(" Shown: {} of {} runs.", shown.len(), runs[0].len());
     }
     let way = if matches!(number, "15" | "17") { "row" } else { "column" };
     let name = format!("fig{number}-{file}-by-{way}");
     let title = format!("{quantity} by {by}");
     Some(Figure::new(name, title, caption, drawing).numbered(number))
+}
+
+/// Returns the colour of the n-th of `count` values; neighbours among many values share one.
+fn colour(n: usize, count: usize) -> &'static str {
+    let most = EIGHT.len();
+    match count {
+        0..=4 => FOUR[n % 4],
+        5..=8 => EIGHT[(n * (most - 1) + (count - 1) / 2) / (count - 1)],
+        _ => EIGHT[n * most / count],
+    }
+}
+
+/// Returns the legend of the colours and, by curve, of the grains or the reference.
+fn legend(data: &FigureData, layout: &Layout, reference: Option<&str>, values: &[f64]) -> Legend {
+    let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
+        name,
+        colour,
+        line: Some(dash.unwrap_or_default()),
+        symbol: None,
+    };
+    let mut entries: Vec<Entry> = Vec::new();
+    let coloured: Vec<(&str, f64)> =
+        values.iter().enumerate().map(|(n, v)| (colour(n, values.len()), *v)).collect();
+    for group in coloured.chunk_by(|a, b| a.0 == b.0) {
+        let [(colour, first), .., (_, last)] = group else {
+            let (colour, value) = group[0];
+            entries.push(entry(data.factor_label(layout.within, value), colour, None));
+            continue;
+        };
+        let label = data.factor_label(layout.within, *first);
+        let last = data.factor_value(layout.within, *last);
+        entries.push(entry(format!("{label} to {last}"), colour, None));
+    }
+    match layout.curve {
+        Curve::Velocity => {
+            entries.push(entry("leading".to_owned(), INK, None));
+            entries.push(entry("trailing".to_owned(), INK, DASHED));
+        }
+        Curve::Gap => {
+            entries.extend(reference.map(|name| entry(text::literal(name), INK, None)));
+        }
+    }
+    Legend::new(entries, PAGE - LEFT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_distinct_colours_or_share_them_with_their_neighbours() {
+        for count in 1..=30 {
+            let mut colours: Vec<&str> = (0..count).map(|n| colour(n, count)).collect();
+            colours.dedup();
+            let groups = colours.len();
+            assert_eq!(groups, count.min(EIGHT.len()), "{count}");
+            colours.sort_unstable();
+            colours.dedup();
+            assert_eq!(groups, colours.len(), "{count}: a colour has two meanings");
+        }
+    }
 }

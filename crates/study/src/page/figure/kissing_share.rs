@@ -4,10 +4,11 @@ use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{PAGE, series_colour};
+use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, letter, text};
 
 use super::data::{FigureData, unique};
+use super::legend::LineStyle;
 use crate::analysis::kissing::Level;
 use crate::analysis::survival::kaplan_meier;
 
@@ -35,8 +36,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let width = (PAGE - LEFT - 8.0 - GAP * (across as f64 - 1.0)) / across as f64;
     let entry = |(i, name): (usize, &String)| Entry {
         name: text::literal(name),
-        colour: series_colour(i),
-        line: Some(""),
+        colour: LineStyle::nth(i).colour,
+        line: Some(LineStyle::nth(i).dash.unwrap_or_default()),
         symbol: None,
     };
     let legend = Legend::new(names.iter().enumerate().map(entry), PAGE - LEFT);
@@ -60,9 +61,10 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
         }
         for level in shown.iter().filter(|l| l.grid.as_ref() == grids.get(panel)) {
-            let colour = names.iter().position(|name| *name == level.level).unwrap_or(0);
+            let n = names.iter().position(|name| *name == level.level).unwrap_or(0);
+            let style = LineStyle::nth(n);
             let clip = format!("clip-share-{panel}-{}", level.level);
-            frame.curve(&mut drawing, &steps(level, end), series_colour(colour), None, &clip);
+            frame.curve(&mut drawing, &steps(level, end), style.colour, style.dash, &clip);
         }
         let last_row = panel + across >= panels;
         frame.outline(&mut drawing, Labelled { across: last_row, up: column == 0 });

@@ -1,24 +1,25 @@
 //! Fig. 14: kissing times of all models, and their spread over the orientations of each grain.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{BLUE, GREEN, HAIR, INK, ORANGE, PAGE, TEXT, VERMILION};
+use grainwake_plot::style::{BLUE, HAIR, INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, factor_label, symbol_entry};
+use super::data::{FigureData, symbol_entry};
+use super::legend::LineStyle;
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
-use crate::format::significant;
+use crate::format::{significant, title};
 
-const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 const SHADES: [&str; 2] = ["#e9e9ec", "#f6f6f8"];
 const LABEL: &str = "kissing time  *t* √(*g*/*d*)  [–]";
 const LEFT: f64 = 38.0;
-/// Height of the legend of the first figure [pt].
+/// Top edge of the frame without a legend, and vertical position of a legend [pt].
+const TOP: f64 = 8.0;
 const LEGEND: f64 = 9.0;
 
 /// Frame with one position per grain, grouped into blocks of equal row factor.
@@ -32,7 +33,7 @@ struct Layout<'a> {
     blocks: Vec<(usize, usize, f64)>,
 }
 
-fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>> {
+fn layout<'a>(data: &'a FigureData, height: f64) -> Option<Layout<'a>> {
     let request = &data.plan.analysis.figures;
     let axis = request.grains.as_ref()?;
     let grains = data.levels(axis);
@@ -40,15 +41,9 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
     let reference = request.reference.as_ref();
     let found = reference.and_then(|name| all.iter().find(|o| o.model == *name)).cloned();
     let (_, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, o.value]))?;
-    let count = grains.len() + usize::from(reference.is_some());
-    let mut across = Axis::linear("grain", 0.0, count as f64, 4, AxisRange::Tight);
-    let number = |name: &str| {
-        let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
-        digits.trim_start_matches('0').to_owned()
-    };
-    let ticks = grains.iter().map(|grain| number(grain));
-    let ticks = ticks.chain(reference.map(|name| text::literal(name)));
-    across.ticks = ticks.enumerate().map(|(i, label)| (i as f64 + 0.5, label)).collect();
+    let ticks = short_names(&grains).into_iter().chain(reference.cloned());
+    let ticks = ticks.map(|name| text::literal(&name)).collect();
+    let across = Axis::categories(&text::literal(&title(axis)), ticks);
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
         let run = data.run_at(axis, grain)?;
@@ -66,7 +61,7 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
         all,
         frame: Frame {
             x: LEFT,
-            y: top,
+            y: TOP,
             width: PAGE - LEFT - 8.0,
             height,
             across,
@@ -77,11 +72,28 @@ fn layout<'a>(data: &'a FigureData, height: f64, top: f64) -> Option<Layout<'a>>
     })
 }
 
+/// Returns the numbers of names that differ in a final number only; else the names.
+fn short_names(names: &[String]) -> Vec<String> {
+    let beginning = names.first().map(|name| name.trim_end_matches(|c: char| c.is_ascii_digit()));
+    let number = |name: &String| -> Option<u64> {
+        let digits = name.strip_prefix(beginning?)?;
+        digits.parse().ok().filter(|_| digits.bytes().all(|c| c.is_ascii_digit()))
+    };
+    let numbers: Option<Vec<u64>> = names.iter().map(number).collect();
+    let distinct =
+        |numbers: &Vec<u64>| numbers.iter().collect::<BTreeSet<_>>().len() == names.len();
+    match numbers.filter(distinct) {
+        Some(numbers) => numbers.iter().map(u64::to_string).collect(),
+        None => names.to_vec(),
+    }
+}
+
 impl Layout<'_> {
     /// Starts a drawing with blocks, grid and the level of the reference.
-    fn drawing(&self, rows: Option<&str>) -> Drawing {
+    fn drawing(&self, data: &FigureData) -> Drawing {
         let f = &self.frame;
-        let mut drawing = Drawing::new(PAGE, f.y + f.height + 26.0);
+        let rows = data.plan.analysis.figures.rows.as_ref();
+        let mut drawing = Drawing::new(PAGE, f.y + f.height + f.foot());
         let blocks = || {
             self.blocks.iter().enumerate().map(|(n, (first, last, value))| {
                 let (left, right) = (f.px(*first as f64), f.px(*last as f64 + 1.0));
@@ -94,7 +106,7 @@ impl Layout<'_> {
         f.grid(&mut drawing);
         for (left, right, shade, value) in blocks() {
             if let Some(factor) = rows.filter(|_| value.is_finite()) {
-                let label = factor_label(factor, value);
+                let label = data.fitting_label(factor, value, right - left - 4.0);
                 let (middle, width) = (0.5 * (left + right), text::width(&label, TEXT) + 4.0);
                 // Hides the grid behind the letters.
                 drawing.rectangle(middle - 0.5 * width, f.y + 1.0, width, 11.0, &shade);
@@ -131,11 +143,11 @@ impl Layout<'_> {
 /// Draws the kissing time of every model, with its range over the ensemble.
 pub fn by_model(data: &FigureData) -> Option<Figure> {
     let request = &data.plan.analysis.figures;
-    let layout = layout(data, 190.0, 20.0)?;
-    let mut drawing = layout.drawing(request.rows.as_deref());
+    let mut layout = layout(data, 190.0)?;
     let orientations = request.orientations.as_ref();
     let levels = orientations.map(|axis| data.levels(axis)).unwrap_or_default();
-    let entry = |(n, name): (usize, &String)| symbol_entry(name, n, COLOURS[n % 4]);
+    let style = |n: usize| LineStyle::of_level(n, levels.len());
+    let entry = |(n, name): (usize, &String)| symbol_entry(name, style(n));
     let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
     let censored = layout.censored();
     if censored > 0 {
@@ -146,7 +158,10 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
             symbol: Some((Marker::Circle, Fill::Hollow)),
         });
     }
-    Legend::new(entries, PAGE - LEFT).draw(&mut drawing, (LEFT, LEGEND));
+    let legend = Legend::new(entries, PAGE - LEFT);
+    layout.frame.y = legend.height() + 10.5;
+    let mut drawing = layout.drawing(data);
+    legend.draw(&mut drawing, (LEFT, LEGEND));
     for observation in &layout.all {
         let grain = observation.levels.get(layout.axis);
         let Some(i) = grain.and_then(|g| layout.grains.iter().position(|o| o == g)) else {
@@ -159,8 +174,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
             count => 0.6 * n as f64 / (count - 1) as f64 - 0.3,
         };
         let at = i as f64 + 0.5 + shift;
-        let sign = Marker::nth(n);
-        layout.mark(&mut drawing, at, observation, sign, COLOURS[n % 4]);
+        layout.mark(&mut drawing, at, observation, style(n).sign, style(n).colour);
     }
     if let Some(reference) = &layout.reference {
         let at = layout.reference_position();
@@ -192,9 +206,9 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
 
 /// Draws a box plot of the kissing times over the orientations of each grain.
 pub fn box_plot(data: &FigureData) -> Option<Figure> {
-    let layout = layout(data, 160.0, 8.0)?;
+    let layout = layout(data, 160.0)?;
     let f = &layout.frame;
-    let mut drawing = layout.drawing(data.plan.analysis.figures.rows.as_deref());
+    let mut drawing = layout.drawing(data);
     let box_style =
         format!("fill=\"{BLUE}\" fill-opacity=\"0.35\" stroke=\"{INK}\" stroke-width=\"{HAIR}\"");
     let mut widest: Option<(f64, &String)> = None;
@@ -244,4 +258,28 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     }
     let title = "Spread of the kissing time by grain";
     Some(Figure::new("fig14b-kissing-time-spread", title, caption, drawing).numbered("14b"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short_names;
+
+    #[test]
+    fn only_numbered_names_are_shortened() {
+        let short = |names: &[&str]| {
+            short_names(&names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>())
+        };
+        assert_eq!(short(&["g01", "g02", "g10"]), ["1", "2", "10"]);
+        assert_eq!(short(&["7", "08"]), ["7", "8"]);
+        for names in [
+            ["quartz", "sand2mm", "loess2mm"],
+            ["g1", "h2", "g3"],
+            ["g1", "g01", "g2"],
+            ["s1.5", "s2.5", "s3.5"],
+            ["coal", "coal1", "coal2"],
+        ] {
+            assert_eq!(short(&names), names);
+        }
+        assert!(short(&[]).is_empty());
+    }
 }

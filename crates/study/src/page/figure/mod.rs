@@ -17,7 +17,6 @@ mod trends;
 use grainwake_plot::Figure;
 
 pub use data::FigureData;
-use data::numbered_as_in_paper;
 
 /// Draws all figures that the study has data for; omitted ones are added to `notes`.
 pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
@@ -38,6 +37,12 @@ pub fn all(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
         renumber(&mut out);
     }
     out
+}
+
+/// Returns whether the study shows grains, orientations and set-up as the paper's first figures.
+fn numbered_as_in_paper(data: &FigureData) -> bool {
+    let request = &data.plan.analysis.figures;
+    request.grains.is_some() && request.orientations.is_some() && request.setup.is_some()
 }
 
 /// Numbers the figures from 1, also in their file names.

@@ -100,12 +100,20 @@ fn distances(data: &FigureData) -> Option<Figure> {
     against_time(data, &curves, "*t* √(*g*/*d*)  [–]", texts)
 }
 
-fn against_time(data: &FigureData, curves: &Curves, time: &str, texts: Texts) -> Option<Figure> {
+fn against_time(
+    data: &FigureData,
+    curves: &Curves,
+    time: &str,
+    mut texts: Texts,
+) -> Option<Figure> {
     let points = || curves.iter().flat_map(|(_, points)| points.iter().copied());
     let (_, end) = extent(points().map(|p| p.0))?;
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
     let styles = LineStyles::of(data);
     let legend = styles.legend(LEFT, false);
+    if legend.height() == 0.0 {
+        texts.caption += " The models are too many for a legend.";
+    }
     let top = legend.height() + 4.0;
     let frame = Frame {
         x: LEFT,

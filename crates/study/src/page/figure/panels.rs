@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Fill, Frame, Labelled};
+use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
@@ -50,6 +51,20 @@ struct Parameter {
     coordinates: BTreeMap<String, f64>,
     /// Names at the coordinates 0.5, 1.5 ...; none for a numerical parameter.
     names: Option<Vec<String>>,
+}
+
+impl Parameter {
+    /// Returns the horizontal axis; none without coordinates.
+    fn across(&self) -> Option<Axis> {
+        let label = text::literal(&title(&self.name));
+        if let Some(names) = &self.names {
+            let names = names.iter().map(|name| text::literal(name)).collect();
+            return Some(Axis::categories(&label, names));
+        }
+        let (a, b) = extent(self.coordinates.values().copied())?;
+        let margin = 0.06 * (b - a);
+        Some(Axis::linear(&label, a - margin, b + margin, 5, AxisRange::Tight))
+    }
 }
 
 /// Returns the varied parameters: the axes; without axes the factors; without factors the models.
@@ -130,39 +145,36 @@ pub(super) fn against_parameters(
     let left_out = parameters.len().saturating_sub(PANELS);
     parameters.truncate(PANELS);
     let styles = LineStyles::of(data);
-    let legend = styles.legend(LEFT, true);
-    let top = legend.height() + 4.0;
-    let row = HEIGHT + 30.0;
-    let rows = parameters.len().div_ceil(2);
-    let mut drawing = Drawing::new(PAGE, top + rows as f64 * row);
-    legend.draw(&mut drawing, (LEFT, 5.0));
-    let width = (PAGE - LEFT - 8.0 - GAP) / 2.0;
-    for (i, parameter) in parameters.iter().enumerate() {
-        let label = text::literal(&title(&parameter.name));
-        let across = match &parameter.names {
-            Some(names) => {
-                let mut axis = Axis::linear(&label, 0.0, names.len() as f64, 4, AxisRange::Tight);
-                let tick = |(i, name): (usize, &String)| (i as f64 + 0.5, text::literal(name));
-                axis.ticks = names.iter().enumerate().map(tick).collect();
-                axis
-            }
-            None => {
-                let (a, b) = extent(parameter.coordinates.values().copied())?;
-                let margin = 0.06 * (b - a);
-                Axis::linear(&label, a - margin, b + margin, 5, AxisRange::Tight)
-            }
-        };
-        let frame = Frame {
-            x: LEFT + (i % 2) as f64 * (width + GAP),
-            y: top + (i / 2) as f64 * row,
+    // Names along the axis replace the legend of a single panel.
+    let named = matches!(parameters.as_slice(), [Parameter { names: Some(_), .. }]);
+    let legend = if named { Legend::default() } else { styles.legend(LEFT, true) };
+    let columns = parameters.len().min(2);
+    let width = (PAGE - LEFT - 8.0 - GAP * (columns as f64 - 1.0)) / columns as f64;
+    let frame = |(i, parameter): (usize, &Parameter)| {
+        let column = i % columns;
+        Some(Frame {
+            x: LEFT + column as f64 * (width + GAP),
+            y: 0.0,
             width,
             height: HEIGHT,
-            across,
+            across: parameter.across()?,
             up: Axis::linear(texts.up, low, high, 5, AxisRange::Rounded),
-        };
+        })
+    };
+    let frames: Option<Vec<Frame>> = parameters.iter().enumerate().map(frame).collect();
+    let mut frames = frames?;
+    let mut bottom = legend.height() + 4.0;
+    for row in frames.chunks_mut(columns) {
+        let foot = row.iter().map(Frame::foot).fold(0.0, f64::max);
+        row.iter_mut().for_each(|frame| frame.y = bottom);
+        bottom += HEIGHT + foot + 4.0;
+    }
+    let mut drawing = Drawing::new(PAGE, bottom);
+    legend.draw(&mut drawing, (LEFT, 5.0));
+    for (i, (parameter, frame)) in parameters.iter().zip(&frames).enumerate() {
         frame.grid(&mut drawing);
-        draw_panel(&mut drawing, &frame, parameter, &all, data, &styles);
-        frame.outline(&mut drawing, Labelled { across: true, up: i % 2 == 0 });
+        draw_panel(&mut drawing, frame, parameter, &all, data, &styles);
+        frame.outline(&mut drawing, Labelled { across: true, up: i % columns == 0 });
     }
     let mut caption = texts.caption.clone();
     let models = data.plan.runs.iter().filter(|r| r.member == 0).count();

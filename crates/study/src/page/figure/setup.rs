@@ -19,7 +19,9 @@ pub fn figure(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
     let name = data.plan.analysis.figures.setup.as_ref()?;
     let case = data.run(name).and_then(|run| data.case(run));
     if case.is_none() {
-        notes.push(format!("figure 7 is left out: the case of {name} cannot be read"));
+        notes.push(format!(
+            "the figure of the set-up is left out: the case of {name} cannot be read"
+        ));
     }
     draw(name, &case?)
 }

@@ -6,7 +6,7 @@ use grainwake_plot::{Figure, text};
 use grainwake_report::features::RunKind;
 use grainwake_report::{RunReport, read_report};
 
-use super::data::{FigureData, numbered_as_in_paper};
+use super::data::FigureData;
 use crate::run::state::StateKind;
 
 /// Number of the first of these figures in the paper.
@@ -23,11 +23,7 @@ pub fn figures(data: &FigureData, notes: &mut Vec<String>) -> Vec<Figure> {
             records.any(|r| !matches!(r.state, StateKind::Stale | StateKind::Missing))
         };
         let run = data.run(name).filter(|run| usable(&run.name));
-        let which = if numbered_as_in_paper(data) {
-            format!("figures {} and {}", numbers.0, numbers.1)
-        } else {
-            format!("the pictures of {name}")
-        };
+        let which = format!("the pictures of {name}");
         match run.map(|run| read_report(&run.folder(data.folder))) {
             None => notes.push(format!("{which} are left out: there is no run {name}")),
             Some(Err(error)) => notes.push(format!("{which} are left out: {error}")),

@@ -2,22 +2,29 @@
 
 use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
+use grainwake_plot::frame::{Fill, Frame, Labelled};
 use grainwake_plot::legend::Legend;
-use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, PAGE, VERMILION};
+use grainwake_plot::style::{INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
 use super::data::{FigureData, symbol_entry};
+use super::legend::LineStyle;
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
-/// Colours of the levels of an axis.
-pub(super) const COLOURS: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
+/// Beginning of the label of a panel.
+const QUANTITY: &str = "rank correlation with";
 /// Height of the row of one level [pt].
 const ROW: f64 = 9.0;
 const LEFT: f64 = 96.0;
 const GAP: f64 = 26.0;
-const TOP: f64 = 26.0;
+/// Largest number of panels in a row.
+const ACROSS: usize = 4;
+/// Space between two rows of panels [pt].
+const SPACE: f64 = 8.0;
+/// Height below a panel with a label of one line, and of a further line [pt].
+const FOOT: f64 = 26.0;
+const LINE: f64 = 10.0;
 
 /// Draws one panel per factor, with one row per quantity and level of the axis.
 pub fn figure(data: &FigureData) -> Option<Figure> {
@@ -28,19 +35,26 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let levels = data.levels(&request.by);
     let block = ROW * levels.len() as f64 + 8.0;
     let height = block * request.quantities.len() as f64;
-    let panels = request.factors.len().max(1) as f64;
-    let width = (PAGE - LEFT - 8.0 - GAP * (panels - 1.0)) / panels;
-    let mut drawing = Drawing::new(PAGE, TOP + height + 26.0);
+    let (across, labels) = labels(&request.factors);
+    let foot = FOOT + if labels.iter().any(|label| label.len() > 1) { LINE } else { 0.0 };
+    let width = panel_width(across);
+    let style = |l: usize| LineStyle::of_level(l, levels.len());
+    let entry = |(l, level): (usize, &String)| symbol_entry(level, style(l));
+    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
+    let top = legend.height() + 16.5;
+    let rows = request.factors.len().div_ceil(across);
+    let mut drawing = Drawing::new(PAGE, top + rows as f64 * (height + foot + SPACE) - SPACE);
+    legend.draw(&mut drawing, (LEFT, 12.0));
     for (i, factor) in request.factors.iter().enumerate() {
         let mut up = Axis::linear("", 0.0, height, 1, AxisRange::Tight);
         up.ticks.clear();
-        let label = format!("rank correlation with {}", text::literal(factor));
+        let (row, column) = (i / across, i % across);
         let frame = Frame {
-            x: LEFT + i as f64 * (width + GAP),
-            y: TOP,
+            x: LEFT + column as f64 * (width + GAP),
+            y: top + row as f64 * (height + foot + SPACE),
             width,
             height,
-            across: Axis::linear(&label, -1.0, 1.0, 4, AxisRange::Tight),
+            across: Axis::linear(&labels[i][0], -1.0, 1.0, 4, AxisRange::Tight),
             up,
         };
         for (q, quantity) in request.quantities.iter().enumerate() {
@@ -48,7 +62,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             if q % 2 == 0 {
                 drawing.rectangle(frame.x, top, width, block, "fill=\"#f4f4f6\"");
             }
-            if i == 0 {
+            if column == 0 {
                 let place = (LEFT - 6.0, top + 0.5 * block);
                 drawing.note(place, Anchor::End, &text::literal(&title(quantity)));
             }
@@ -60,24 +74,69 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
                     continue;
                 };
                 let y = top + 4.0 + ROW * (l as f64 + 0.5);
-                let colour = COLOURS[l % 4];
+                let LineStyle { colour, sign, .. } = style(l);
                 let interval = [(frame.px(low), y), (frame.px(high), y)];
                 drawing.line(&interval, colour, 1.2, None);
-                Marker::nth(l).draw(&mut drawing, (frame.px(rho), y), 2.7, colour, Fill::Solid);
+                sign.draw(&mut drawing, (frame.px(rho), y), 2.7, colour, Fill::Solid);
             }
         }
         let zero = frame.px(0.0);
         let zero = [(zero, frame.y), (zero, frame.y + height)];
         drawing.line(&zero, INK, 0.6, Some("2 2"));
         frame.outline(&mut drawing, Labelled { across: true, up: false });
+        if let Some(name) = labels[i].get(1) {
+            let below = (frame.x + 0.5 * width, frame.y + height + frame.foot() - 6.0 + LINE);
+            drawing.text(below, Anchor::Middle, name);
+        }
     }
-    let entry = |(l, level): (usize, &String)| symbol_entry(level, l, COLOURS[l % 4]);
-    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
-    legend.draw(&mut drawing, (LEFT, 12.0));
     let caption = format!(
         "Spearman's rank correlation of each quantity with each factor, over up to {n} grains in \
          one orientation, with 95 % intervals. An interval that excludes zero indicates a trend."
     );
     let title = "Rank correlations with shape factors";
     Some(Figure::new("correlations", title, caption, drawing))
+}
+
+/// Width of each of `across` panels in a row [pt].
+fn panel_width(across: usize) -> f64 {
+    (PAGE - LEFT - 8.0 - GAP * (across as f64 - 1.0)) / across as f64
+}
+
+/// Returns the number of panels in a row and the lines of their labels, which do not overlap.
+fn labels(factors: &[String]) -> (usize, Vec<Vec<String>>) {
+    let names: Vec<String> = factors.iter().map(|f| text::literal(&title(f))).collect();
+    let one = |name: &String| vec![format!("{QUANTITY} {name}")];
+    let two = |name: &String| vec![QUANTITY.to_owned(), name.clone()];
+    let one: Vec<Vec<String>> = names.iter().map(one).collect();
+    let two: Vec<Vec<String>> = names.iter().map(two).collect();
+    let fits = |labels: &[Vec<String>], across: usize| {
+        // The last panel ends near the edge of the page.
+        let room = panel_width(across) + 14.0;
+        labels.iter().flatten().all(|line| text::width(line, TEXT) <= room)
+    };
+    let most = factors.len().clamp(1, ACROSS);
+    if fits(&one, most) {
+        return (most, one);
+    }
+    ((1..=most).rev().find(|across| fits(&two, *across)).unwrap_or(1), two)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_of_many_factors_do_not_overlap() {
+        let of = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            labels(&names)
+        };
+        let (across, two) = of(&["sphericity", "roundness"]);
+        assert_eq!((across, &two[0]), (2, &vec!["rank correlation with sphericity".to_owned()]));
+        let (across, four) = of(&["density", "diameter", "viscosity_Pas", "krumbein_sphericity"]);
+        assert_eq!((across, &*four[3][1]), (4, "krumbein sphericity"));
+        let (across, long) = of(&["density", "ratio_of_the_longest_axis_to_the_shortest_axis"]);
+        assert_eq!((across, long.len()), (2, 2));
+        assert_eq!(of(&["a"; 9]).0, ACROSS);
+    }
 }
