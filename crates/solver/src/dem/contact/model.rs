@@ -327,15 +327,12 @@ impl FrictionStep {
         let sliding = tangential(sliding);
         let direction = sliding.normalize_or_zero();
         let damping = pair.stable_damping(self.damping, point.lever_arm, direction, self.step);
-        let force = -(self.stiffness * displacement + damping * sliding);
-        // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
+        // Coulomb's bound (Eq. 15) holds for the spring and for the sum with the dashpot; an
+        // attractive normal force carries no friction.
         let limit = self.coefficient * normal_force.max(0.0);
-        if force.length_squared() <= limit * limit {
-            return (force, displacement);
-        }
-        // The spring keeps the bound, so that the force follows a normal force that grows.
-        let force = force * (limit / force.length());
-        (force, -force / self.stiffness)
+        let displacement = displacement.clamp_length_max(limit / self.stiffness);
+        let force = -(self.stiffness * displacement + damping * sliding);
+        (force.clamp_length_max(limit), displacement)
     }
 }
 

@@ -3,14 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::frame::Fill;
-use grainwake_plot::legend::Entry;
 use grainwake_plot::style::{SMALL, TEXT};
 use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
-use super::legend::LineStyle;
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
@@ -160,16 +157,6 @@ pub fn fitting_name(name: &str, width: f64) -> String {
     };
     let mut labels = (0..=all.len()).rev().map(shortened);
     labels.find(|label| text::width(label, SMALL) <= width).unwrap_or_default()
-}
-
-/// Returns the entry of a legend with a symbol.
-pub fn symbol_entry(name: &str, style: LineStyle) -> Entry {
-    Entry {
-        name: text::literal(name),
-        colour: style.colour,
-        line: None,
-        symbol: Some((style.sign, Fill::Solid)),
-    }
 }
 
 #[cfg(test)]

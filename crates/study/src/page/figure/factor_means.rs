@@ -7,8 +7,8 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, symbol_entry, unique};
-use super::legend::LineStyle;
+use super::data::{FigureData, unique};
+use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::factor_mean::{FactorMean, KISSING_SHARE};
 use crate::format::title;
 

@@ -9,8 +9,8 @@ use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, HAIR, INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, symbol_entry};
-use super::legend::LineStyle;
+use super::data::FigureData;
+use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
 use crate::format::{significant, title};

@@ -51,6 +51,16 @@ impl LineStyle {
     }
 }
 
+/// Returns the entry of a legend with a symbol.
+pub fn symbol_entry(name: &str, style: LineStyle) -> Entry {
+    Entry {
+        name: text::literal(name),
+        colour: style.colour,
+        line: None,
+        symbol: Some((style.sign, Fill::Solid)),
+    }
+}
+
 /// Assignment of line styles to runs.
 pub enum LineStyles {
     /// One style per model; none for many models.

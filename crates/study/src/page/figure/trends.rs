@@ -7,8 +7,8 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, symbol_entry};
-use super::legend::LineStyle;
+use super::data::FigureData;
+use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::correlation::Correlation;
 use crate::format::title;
 
