@@ -143,3 +143,52 @@ fn the_surface_converges_with_the_voxels() {
         assert!(found.iter().all(|[grey, mask]| grey < mask), "{found:?}");
     }
 }
+
+/// Fractions of a ball in a cubic image of `n` voxels.
+fn ball(n: usize, centre: DVec3, radius: f64) -> Vec<f32> {
+    shares([n; 3], &[&|x: DVec3| x.distance(centre) - radius], &[(centre, radius)])
+}
+
+/// Volumes of the grains of a blurred image with noise of 2 % of the contrast.
+fn volumes(n: usize, contrast: &[f32], threshold: f64) -> Vec<f64> {
+    let image = greys(&blurred(contrast, [n; 3], 1.0), 0.02, 7);
+    let volume = Volume::from_labels([n; 3], image).unwrap();
+    let options = ScanOptions {
+        threshold: Some(Threshold::Value(9000.0 + 21000.0 * threshold)),
+        split: true,
+        shape: ShapeOptions { nodes: Some(100), roundness: false, ..Default::default() },
+        ..ScanOptions::new(1.0)
+    };
+    let grains = shapes_from_volume(&volume, &SourceFile::default(), &options).unwrap();
+    grains.into_iter().map(|grain| grain.shape.unwrap().volume()).collect()
+}
+
+/// A cavity neither darkens the grain's own grey nor loses volume, for thick and thin walls and for
+/// many pores close to the surface.
+#[test]
+fn closed_pores_do_not_change_the_outer_volume() {
+    let (n, radius, centre) = (44, 15.0, DVec3::new(22.2, 21.7, 22.1));
+    let solid = ball(n, centre, radius);
+    let near_the_surface = (0..12).map(|k| {
+        let (angle, z) = (2.4 * f64::from(k), f64::from(k) / 6.0 - 0.9);
+        let along = DVec3::new(angle.cos(), angle.sin(), 0.0) * (1.0 - z * z).sqrt();
+        (centre + (along + z * DVec3::Z) * (radius - 5.0), 3.0)
+    });
+    for pores in [
+        vec![],
+        vec![(centre, 4.0)],
+        vec![(centre, 8.0)],
+        vec![(centre, 9.0)],
+        near_the_surface.collect(),
+    ] {
+        let mut contrast = solid.clone();
+        for (place, size) in &pores {
+            let pore = ball(n, *place, *size);
+            contrast.iter_mut().zip(pore).for_each(|(c, p)| *c = (*c - p).max(0.0));
+        }
+        let [found] = volumes(n, &contrast, 0.5)[..] else { panic!("one grain") };
+        let error = found / (4.0 / 3.0 * PI * radius.powi(3)) - 1.0;
+        println!("{pores:?}: {error:+.4}");
+        assert!(error.abs() < 0.01, "{pores:?}: {error}");
+    }
+}

@@ -67,6 +67,7 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     if voxels < FEWEST {
         return Err(ShapeError::TooFewVoxels { label, voxels, needed: FEWEST });
     }
+    let solid = Mask { dims: mask.dims, solid: mask.solid.clone() };
     let filled = fill_cavities(mask.dims, &mut mask.solid);
     let longest = (0..3).map(|a| region.upper[a] - region.lower[a] + 1).max().unwrap_or(1);
     let factor = FINE[usize::from(segments.grey.is_none())].div_ceil(longest).clamp(1, 4);
@@ -93,7 +94,7 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     }
     let (field, volume, image) = match &segments.grey {
         Some(grey) => {
-            let cut = grey.cut(&mask, low, label, smoothing);
+            let cut = grey.cut(&mask, &solid, low, label, smoothing);
             provenance =
                 provenance.with("surface", "grey").with("blur_voxels", format!("{:.3}", cut.blur));
             (cut.field, cut.volume, cut.kernel)

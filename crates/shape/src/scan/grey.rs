@@ -77,11 +77,21 @@ impl Grey {
         Grey { dims, values, owner, void, solid }
     }
 
-    /// Returns the grain `label`. Its mask contains its solid voxels with cavities filled; `low` is
-    /// the image coordinate of the first voxel of the mask, which may lie outside.
-    pub(crate) fn cut(&self, mask: &Mask, low: [isize; 3], label: u32, sigma: f64) -> Cut {
+    /// Returns the grain `label`. `mask` contains its solid voxels with cavities filled, `solid`
+    /// without; `low` is the image coordinate of the first voxel, which may lie outside.
+    pub(crate) fn cut(
+        &self,
+        mask: &Mask,
+        solid: &Mask,
+        low: [isize; 3],
+        label: u32,
+        sigma: f64,
+    ) -> Cut {
         let dims = mask.dims;
         let distance = transform::signed(mask);
+        let porous = (solid.solid != mask.solid).then(|| transform::signed(solid));
+        // Distance from the surface or from the nearest cavity.
+        let depth = porous.as_ref().unwrap_or(&distance);
         let place = |n: usize| -> Option<usize> {
             let at = crate::grid::place(dims, n);
             let mut index = 0;
@@ -94,17 +104,17 @@ impl Grey {
             }
             Some(index)
         };
-        let solid = self.own_grey(&distance, &place);
+        let own = self.own_grey(depth, &place);
         let share = |n: usize| -> f64 {
-            if distance[n] < -BAND {
+            // A cavity belongs to the grain for any grey value, as does its wall, which its blur
+            // darkens. Halfway through a wall to the outside the two blurs compensate.
+            if distance[n] < -BAND || depth[n] > distance[n] {
                 return 1.0;
             }
             match place(n) {
                 Some(m) if distance[n] <= BAND && self.owner[m] & !HALO == label => {
-                    (f64::from(self.values[m]) - self.void) / (solid - self.void)
+                    (f64::from(self.values[m]) - self.void) / (own - self.void)
                 }
-                // A filled cavity belongs to the grain for any grey value.
-                Some(m) if mask.solid[n] && self.owner[m] == 0 => 1.0,
                 _ => 0.0,
             }
         };
@@ -131,9 +141,9 @@ impl Grey {
     }
 
     /// Returns the mean grey of the grain's own deep voxels, since grains differ.
-    fn own_grey(&self, distance: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
-        let deep: Vec<f64> = (0..distance.len())
-            .filter(|n| distance[*n] < -BAND - DEEPER)
+    fn own_grey(&self, depth: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
+        let deep: Vec<f64> = (0..depth.len())
+            .filter(|n| depth[*n] < -BAND - DEEPER)
             .filter_map(place)
             .map(|m| f64::from(self.values[m]))
             .collect();
