@@ -192,3 +192,20 @@ fn closed_pores_do_not_change_the_outer_volume() {
         assert!(error.abs() < 0.01, "{pores:?}: {error}");
     }
 }
+
+/// A grain of another mineral next to a large one is measured by its own grey.
+#[test]
+fn small_grains_of_another_mineral_have_their_own_grey() {
+    let n = 60;
+    let large = ball(n, DVec3::new(24.2, 24.4, 23.9), 16.0);
+    for radius in [5.5, 7.0] {
+        let small = ball(n, DVec3::new(48.3, 48.1, 47.8), radius);
+        for grey in [0.67, 1.0, 1.67] {
+            let contrast: Vec<f32> = large.iter().zip(&small).map(|(l, s)| l + grey * s).collect();
+            let [_, found] = volumes(n, &contrast, 0.33)[..] else { panic!("two grains") };
+            let error = found / (4.0 / 3.0 * PI * radius.powi(3)) - 1.0;
+            println!("R = {radius}, grey {grey}: {error:+.4}");
+            assert!(error.abs() < 0.03, "R = {radius}, grey {grey}: {error}");
+        }
+    }
+}

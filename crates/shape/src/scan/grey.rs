@@ -27,19 +27,19 @@ pub(crate) struct Grey {
 
 /// Distance from the surface beyond which a voxel is entirely solid or void [voxels].
 const BAND: f32 = 2.7;
-/// Additional distance from the band at which the grey of the grain is sampled [voxels].
+/// Preferred additional distance from the band at which the grey of a grain is sampled [voxels].
 const DEEPER: f32 = 0.5;
+/// Largest blur that is assumed to darken grains without deep voxels [voxels].
+const STRONG_BLUR: f64 = 1.25;
 /// Layers of void that are assigned to a grain [voxels].
 pub(crate) const LAYERS: usize = 4;
-/// Minimum number of deep voxels for a grain's own grey value; below it that of all grains is used.
-const DEEP: usize = 300;
 
 /// Number of voxels sufficient for the mean grey values of an image.
 const ENOUGH: usize = 1 << 24;
 /// Minimum number of deep voxels for the mean grey of a phase.
 const FEW_DEEP: u64 = 200;
-/// Minimum number of less deep voxels; they are preferable to all voxels, which the blur of the
-/// surface darkens.
+/// Minimum number of deep voxels for the grey of a single grain, and of less deep voxels for that
+/// of a phase; they are preferable to all voxels, which the blur of the surface darkens.
 const SOME_DEEP: u64 = 24;
 /// Steps along the axes without a voxel of the other phase that make a voxel deep.
 const CLEAR: usize = 4;
@@ -104,7 +104,7 @@ impl Grey {
             }
             Some(index)
         };
-        let own = self.own_grey(depth, &place);
+        let own = self.own_grey(solid, depth, &place);
         let share = |n: usize| -> f64 {
             // A cavity belongs to the grain for any grey value, as does its wall, which its blur
             // darkens. Halfway through a wall to the outside the two blurs compensate.
@@ -140,17 +140,33 @@ impl Grey {
         }
     }
 
-    /// Returns the mean grey of the grain's own deep voxels, since grains differ.
-    fn own_grey(&self, depth: &[f32], place: &impl Fn(usize) -> Option<usize>) -> f64 {
-        let deep: Vec<f64> = (0..depth.len())
-            .filter(|n| depth[*n] < -BAND - DEEPER)
-            .filter_map(place)
-            .map(|m| f64::from(self.values[m]))
-            .collect();
-        if deep.len() < DEEP {
-            return self.solid;
+    /// Returns the mean grey of the grain's own deep voxels, since grains differ. If there are few,
+    /// its core is a lower bound, and the core divided by its solid fraction under a strong blur an
+    /// upper bound; the mean grey of all grains is moved into these bounds.
+    fn own_grey(
+        &self,
+        solid: &Mask,
+        depth: &[f32],
+        place: &impl Fn(usize) -> Option<usize>,
+    ) -> f64 {
+        let beyond = |limit: f32| -> Vec<(usize, f64)> {
+            let deep = (0..depth.len()).filter(|n| depth[*n] < limit);
+            deep.filter_map(|n| Some((n, f64::from(self.values[place(n)?])))).collect()
+        };
+        let mean = |deep: &[(usize, f64)]| {
+            deep.iter().map(|(_, grey)| grey).sum::<f64>() / deep.len() as f64
+        };
+        let mut deep = [-BAND - DEEPER, -BAND].into_iter().map(beyond);
+        if let Some(deep) = deep.find(|deep| deep.len() as u64 >= SOME_DEEP) {
+            return mean(&deep);
         }
-        deep.iter().sum::<f64>() / deep.len() as f64
+        let core = beyond(0.5 * depth.iter().fold(0.0, |least: f32, d| least.min(*d)));
+        let mask: Vec<f32> = solid.solid.iter().map(|s| f32::from(u8::from(*s))).collect();
+        let blurred = gaussian(&mask, solid.dims, STRONG_BLUR);
+        let fraction =
+            core.iter().map(|(n, _)| f64::from(blurred[*n])).sum::<f64>() / core.len() as f64;
+        let least = mean(&core) - self.void;
+        self.void + (self.solid - self.void).min(least / fraction).max(least)
     }
 }
 
