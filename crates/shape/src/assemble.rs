@@ -87,12 +87,10 @@ pub(crate) fn assemble<D: Distance>(
     let spacing = options.spacing(extent)?;
     let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
     let mut field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
-    if let roundness::Surface::Scanned { .. } = body.surface {
-        // Noise in an image leaves specks; in a mesh or a closed form they are details.
-        let removed = specks::remove(&mut field);
-        if removed > 0.0 {
-            provenance = provenance.with(specks::REMOVED, removed);
-        }
+    let scanned = matches!(body.surface, roundness::Surface::Scanned { .. });
+    let removed = specks::remove(&mut field, scanned);
+    if removed > 0.0 {
+        provenance = provenance.with(specks::REMOVED, removed);
     }
     let off = mass::of_field(&field).centroid;
     if !off.is_finite() {
@@ -131,9 +129,8 @@ pub(crate) fn assemble<D: Distance>(
     let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume, area);
     if options.roundness {
         // Scans have meshes of small faces, on which distance queries are slow.
-        let about = |x: DVec3, hint: &mut u32| match body.surface {
-            roundness::Surface::Scanned { .. } => field.distance(x - off),
-            _ => body.distance.near(x, hint),
+        let about = |x: DVec3, hint: &mut u32| {
+            if scanned { field.distance(x - off) } else { body.distance.near(x, hint) }
         };
         let (_, inscribed) = inscribed::sphere(&body.distance, &about, body.lower, body.upper);
         morphology.inscribed_radius = Some(inscribed);

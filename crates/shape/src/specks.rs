@@ -1,4 +1,5 @@
-//! Specks of a scanned grain: small bodies apart from the largest, left by noise in the image.
+//! Specks: small bodies apart from the largest, left by noise in an image, or at a sharp tip of a
+//! mesh where the grid has samples inside the tip that are no neighbours.
 
 use crate::field::SampledField;
 use crate::runs::{fill_cavities, pieces};
@@ -7,13 +8,17 @@ use crate::runs::{fill_cavities, pieces};
 /// grain is refused.
 pub(crate) const LIMIT: f64 = 0.02;
 
+/// Largest number of samples of a speck at the tip of a mesh. More is a detail that the grid breaks
+/// off, and the mesh is refused.
+const TIP: u64 = 8;
+
 /// End of the names of the provenance parameters that hold a removed fraction of the volume.
 pub(crate) const REMOVED: &str = "specks_removed";
 
 /// Removes specks outside the grain and bubbles inside it from a distance field by a change of
 /// sign. Returns the fraction of the volume that changed; 0 if there is none, or more than
-/// [`LIMIT`].
-pub(crate) fn remove(field: &mut SampledField) -> f64 {
+/// [`LIMIT`], or in a field that was not `scanned` a speck of more than [`TIP`] samples.
+pub(crate) fn remove(field: &mut SampledField, scanned: bool) -> f64 {
     let (dims, levels) = (field.dims(), field.levels());
     let (number, sizes) = pieces(dims, |n| levels[n] < 0.0);
     let largest = (0..sizes.len()).max_by_key(|n| (sizes[*n], std::cmp::Reverse(*n)));
@@ -25,7 +30,9 @@ pub(crate) fn remove(field: &mut SampledField) -> f64 {
     let bubbles = fill_cavities(dims, &mut inside);
     let specks: u64 = sizes.iter().sum::<u64>() - sizes[largest];
     let share = (specks + bubbles) as f64 / sizes[largest] as f64;
-    if share == 0.0 || share > LIMIT {
+    let detail = |(n, size): (usize, &u64)| n != largest && *size > TIP;
+    let details = !scanned && sizes.iter().enumerate().any(detail);
+    if share == 0.0 || share > LIMIT || details {
         return 0.0;
     }
     for (level, inside) in field.levels_mut().iter_mut().zip(inside) {
@@ -58,19 +65,27 @@ mod tests {
         let at = |i: usize, j: usize, k: usize| i + 24 * (j + 24 * k);
         let clean = ball(&[]);
         let mut field = clean.clone();
-        assert_eq!(remove(&mut field), 0.0);
+        assert_eq!(remove(&mut field, true), 0.0);
         assert_eq!(field, clean);
         // A speck of two samples, and a bubble of one.
         let mut field = ball(&[at(2, 2, 2), at(3, 2, 2), at(12, 12, 12)]);
         let solid = clean.levels().iter().filter(|l| **l < 0.0).count() as f64;
-        let share = remove(&mut field);
+        let share = remove(&mut field, false);
         assert!((share - 3.0 / (solid - 1.0)).abs() < 1e-6, "{share}");
         assert_eq!(field, clean);
         // Beyond the limit nothing changes.
         let many: Vec<usize> = (0..50).map(|n| at(2 + n % 5, 2 + n / 5, 2)).collect();
         let two = ball(&many);
         let mut field = two.clone();
-        assert_eq!(remove(&mut field), 0.0);
+        assert_eq!(remove(&mut field, true), 0.0);
         assert_eq!(field, two);
+        // Nine samples are noise in a scan and a detail of a mesh.
+        let nine: Vec<usize> = (2..11).map(|n| at(n, 2, 2)).collect();
+        let two = ball(&nine);
+        let mut field = two.clone();
+        assert_eq!(remove(&mut field, false), 0.0);
+        assert_eq!(field, two);
+        assert!(remove(&mut field, true) > 0.0);
+        assert_eq!(field, clean);
     }
 }

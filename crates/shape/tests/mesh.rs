@@ -506,3 +506,20 @@ fn a_mesh_in_memory_is_merged_and_checked_as_a_file_is() {
     assert!(message.contains("has vertex 10000"), "{message}");
     assert!(mesh_from_memory(&whole, 0.0).is_err());
 }
+
+/// Samples at the tips of the tetrahedron that are no neighbours of other samples do not count.
+#[test]
+fn a_regular_tetrahedron_is_accepted_for_any_position_of_its_tips() {
+    let vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]];
+    let vertices = vertices.map(|v| DVec3::from_array(v.map(f64::from))).to_vec();
+    let triangles = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+    let mesh = TriangleMesh { vertices, triangles };
+    for cells in [33, 40, 48, 56, 77, 100] {
+        let shape =
+            ShapeOptions { cells, nodes: Some(200), roundness: false, ..Default::default() };
+        let options = MeshOptions { shape, flip: false };
+        let shape = shape_from_mesh(&mesh, &SourceFile::default(), &options).unwrap();
+        println!("{cells}: {:+.5}", shape.volume() / (8.0 / 3.0) - 1.0);
+        close(shape.volume(), 8.0 / 3.0, 0.01);
+    }
+}
