@@ -507,6 +507,55 @@ fn a_mesh_in_memory_is_merged_and_checked_as_a_file_is() {
     assert!(mesh_from_memory(&whole, 0.0).is_err());
 }
 
+/// A prism of height 2 over a polygon, its caps single faces that begin with corner `first`.
+fn prism(polygon: &[[i32; 2]], first: usize) -> (Vec<DVec3>, Vec<Vec<usize>>) {
+    let n = polygon.len();
+    let corner =
+        |z: f64| polygon.iter().map(move |[x, y]| DVec3::new(f64::from(*x), f64::from(*y), z));
+    let mut top: Vec<usize> = (n..2 * n).collect();
+    top.rotate_left(first);
+    let bottom = top.iter().rev().map(|v| v - n).collect();
+    let sides = (0..n).map(|i| vec![i, (i + 1) % n, n + (i + 1) % n, n + i]);
+    (corner(0.0).chain(corner(2.0)).collect(), [bottom, top].into_iter().chain(sides).collect())
+}
+
+#[test]
+fn concave_polygons_do_not_depend_on_their_first_corner() {
+    let folder = Folder::new();
+    let ell: &[[i32; 2]] = &[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]];
+    let horseshoe: &[[i32; 2]] = &[[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]];
+    for (polygon, volume, area) in [(ell, 6.0, 22.0), (horseshoe, 14.0, 46.0)] {
+        for first in 0..polygon.len() {
+            let (vertices, faces) = prism(polygon, first);
+            let mut obj = String::new();
+            let mut ply = format!(
+                "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+                 property float z\nelement face {}\nproperty list uchar int vertex_indices\n\
+                 end_header\n",
+                vertices.len(),
+                faces.len()
+            );
+            for v in &vertices {
+                writeln!(obj, "v {} {} {}", v.x, v.y, v.z).unwrap();
+                writeln!(ply, "{} {} {}", v.x, v.y, v.z).unwrap();
+            }
+            for face in &faces {
+                let numbers = |from: usize| {
+                    face.iter().map(|v| (v + from).to_string()).collect::<Vec<_>>().join(" ")
+                };
+                writeln!(obj, "f {}", numbers(1)).unwrap();
+                writeln!(ply, "{} {}", face.len(), numbers(0)).unwrap();
+            }
+            for (name, text) in [("a.obj", obj), ("a.ply", ply)] {
+                let mesh = folder.read(name, text.as_bytes()).unwrap();
+                close(mesh.signed_volume(), 1e-9 * volume, 1e-12);
+                close(mesh.area(), 1e-6 * area, 1e-12);
+                mesh.check_crossings().unwrap();
+            }
+        }
+    }
+}
+
 /// Samples at the tips of the tetrahedron that are no neighbours of other samples do not count.
 #[test]
 fn a_regular_tetrahedron_is_accepted_for_any_position_of_its_tips() {

@@ -6,6 +6,7 @@ mod harmonics;
 mod nearest_cache;
 mod obj;
 mod ply;
+mod polygon;
 mod propagate;
 mod read;
 mod sampling;

@@ -1,6 +1,6 @@
 //! PLY, text and binary, in both byte orders.
 
-use super::TriangleMesh;
+use super::{TriangleMesh, polygon};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
@@ -66,37 +66,21 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     let header = parser.read_header(&mut reader).map_err(malformed)?;
     check_header(path, &header, size, limits)?;
     let payload = parser.read_payload(&mut reader, &header).map_err(malformed)?;
-    let mut mesh = TriangleMesh::default();
-    for (name, elements) in payload {
-        match name.as_str() {
-            "vertex" => mesh.vertices = elements.iter().map(|e| e.position).collect(),
-            "face" => {
-                for (face, element) in elements.iter().enumerate() {
-                    push_fan(path, &mut mesh.triangles, face, &element.corners)?;
-                }
-            }
-            _ => {}
-        }
+    let elements = |name: &str| payload.get(name).map_or(&[][..], Vec::as_slice);
+    let vertices = elements("vertex").iter().map(|e| e.position).collect();
+    let mut mesh = TriangleMesh { vertices, triangles: Vec::new() };
+    for (face, element) in elements("face").iter().enumerate() {
+        let number = |c: &i64| {
+            let reason = || format!("face {face} has corner number {c}");
+            u32::try_from(*c).map_err(|_| ShapeError::malformed(path, reason()))
+        };
+        let corners = element.corners.iter().map(number).collect::<Result<Vec<u32>>>()?;
+        polygon::push(path, &mut mesh, face, &corners)?;
     }
     if mesh.triangles.len() as u64 > limits.mesh_elements {
         return Err(too_many_elements(path, "more faces", limits));
     }
     Ok(mesh)
-}
-
-fn push_fan(path: &Path, out: &mut Vec<[u32; 3]>, face: usize, corners: &[i64]) -> Result<()> {
-    let number = |c: i64| {
-        u32::try_from(c)
-            .map_err(|_| ShapeError::malformed(path, format!("face {face} has corner number {c}")))
-    };
-    if corners.len() < 3 {
-        let reason = format!("face {face} has {} corners", corners.len());
-        return Err(ShapeError::malformed(path, reason));
-    }
-    for pair in corners[1..].windows(2) {
-        out.push([number(corners[0])?, number(pair[0])?, number(pair[1])?]);
-    }
-    Ok(())
 }
 
 /// Checks that the header declares vertices and faces, and no more than the file can hold.
