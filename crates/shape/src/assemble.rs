@@ -15,7 +15,7 @@ use glam::DVec3;
 /// Resolution, surface nodes and bounds of a sampled shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeOptions {
-    /// Grid cells across the longest extent.
+    /// Grid cells across the longest extent. Scans lower the default for small grains.
     pub cells: usize,
     /// Minimum number of grid cells across the shortest extent; refines the grid of flat grains.
     pub least_cells: usize,

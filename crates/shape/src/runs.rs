@@ -1,4 +1,4 @@
-//! Connected components of a volume, computed from runs: sequences of equal voxels along x.
+//! Connected components of a volume, computed from runs: sequences of voxels of one label along x.
 
 use crate::grid::root;
 use rayon::prelude::*;
@@ -6,10 +6,12 @@ use rayon::prelude::*;
 /// Voxels `begin..end` along x.
 type Run = [u32; 2];
 
-/// Runs of the selected voxels, with a union-find forest of their connectivity.
+/// Runs of the labelled voxels, with a union-find forest of their connectivity.
 struct Runs {
     dims: [usize; 3],
     runs: Vec<Run>,
+    /// Label of each run.
+    labels: Vec<u32>,
     /// First run of every row, and the total number at the end.
     rows: Vec<usize>,
     /// Parent run in the same component; a root is its own parent.
@@ -17,31 +19,43 @@ struct Runs {
 }
 
 impl Runs {
-    /// Creates the runs of the voxels selected by `chosen`. Voxels are connected through faces, or
-    /// with `corners` through faces, edges and corners.
-    fn new(dims: [usize; 3], corners: bool, chosen: impl Fn(usize) -> bool + Sync) -> Runs {
+    /// Creates the runs of the voxels with a label other than 0. Voxels of one label are connected
+    /// through faces, or with `corners`, which needs a single label, through edges and corners too.
+    fn new<L: Into<u32>>(
+        dims: [usize; 3],
+        corners: bool,
+        label: impl Fn(usize) -> L + Sync,
+    ) -> Runs {
         let [nx, ny, nz] = dims;
-        let by_row: Vec<Vec<Run>> = (0..ny * nz)
+        let by_row: Vec<(Vec<Run>, Vec<u32>)> = (0..ny * nz)
             .into_par_iter()
             .map(|row| {
-                let mut runs: Vec<Run> = Vec::new();
-                for i in (0..nx).filter(|i| chosen(nx * row + i)) {
+                let (mut runs, mut labels): (Vec<Run>, Vec<u32>) = Default::default();
+                for i in 0..nx {
+                    let label = label(nx * row + i).into();
                     match runs.last_mut() {
-                        Some(last) if last[1] as usize == i => last[1] += 1,
-                        _ => runs.push([i as u32, i as u32 + 1]),
+                        _ if label == 0 => {}
+                        Some([_, end]) if *end as usize == i && labels.last() == Some(&label) => {
+                            *end += 1;
+                        }
+                        _ => {
+                            runs.push([i as u32, i as u32 + 1]);
+                            labels.push(label);
+                        }
                     }
                 }
-                runs
+                (runs, labels)
             })
             .collect();
         let mut rows = vec![0];
-        rows.extend(by_row.iter().scan(0, |sum, runs| {
+        rows.extend(by_row.iter().scan(0, |sum, (runs, _)| {
             *sum += runs.len();
             Some(*sum)
         }));
-        let runs = by_row.concat();
+        let (runs, labels): (Vec<_>, Vec<_>) = by_row.into_iter().unzip();
+        let (runs, labels) = (runs.concat(), labels.concat());
         let parent = (0..runs.len() as u32).collect();
-        let mut all = Runs { dims, runs, rows, parent };
+        let mut all = Runs { dims, runs, labels, rows, parent };
         for row in 0..ny * nz {
             let (j, k) = (row % ny, row / ny);
             if j > 0 {
@@ -71,7 +85,7 @@ impl Runs {
         let (mut p, mut q) = (self.rows[row], self.rows[other]);
         while p < self.rows[row + 1] && q < self.rows[other + 1] {
             let ([a, b], [c, d]) = (self.runs[p], self.runs[q]);
-            if a < d + slack && c < b + slack {
+            if a < d + slack && c < b + slack && self.labels[p] == self.labels[q] {
                 let [r, s] = [p, q].map(|n| root(&mut self.parent, n as u32));
                 self.parent[r.max(s) as usize] = r.min(s);
             }
@@ -95,13 +109,14 @@ impl Runs {
     }
 }
 
-/// Labels the connected components (through voxel faces) of the voxels selected by `solid`, from 1
-/// in the order of their first voxels, and 0 elsewhere. Also returns their sizes.
-pub(crate) fn pieces(
+/// Numbers the connected components (through voxel faces) of each label, or of the voxels that
+/// `label` selects, from 1 in the order of their first voxels, with 0 elsewhere. Also returns their
+/// sizes.
+pub(crate) fn pieces<L: Into<u32>>(
     dims: [usize; 3],
-    solid: impl Fn(usize) -> bool + Sync,
+    label: impl Fn(usize) -> L + Sync,
 ) -> (Vec<u32>, Vec<u64>) {
-    let runs = Runs::new(dims, false, solid);
+    let runs = Runs::new(dims, false, label);
     let mut number = vec![0u32; dims.iter().product()];
     let mut names = vec![0u32; runs.runs.len()];
     let mut sizes = Vec::new();
@@ -148,6 +163,7 @@ mod tests {
     use crate::grid::place;
     use crate::random::Random;
     use rand::{RngExt, SeedableRng};
+    use std::collections::BTreeSet;
 
     fn noise(count: usize, share: f64) -> Vec<bool> {
         let mut random = Random::seed_from_u64(5);
@@ -182,6 +198,25 @@ mod tests {
             }
         }
         number
+    }
+
+    #[test]
+    fn touching_labels_are_separate_pieces() {
+        let dims = [9, 8, 7];
+        let (solid, other) = (noise(504, 0.7), noise(600, 0.5)[96..].to_vec());
+        let label = |n: usize| u32::from(solid[n]) * (1 + u32::from(other[n]));
+        let (number, sizes) = pieces(dims, label);
+        let mut count = 0;
+        for name in [1, 2] {
+            let chosen: Vec<bool> = (0..504).map(|n| label(n) == name).collect();
+            let alone = flood(dims, &chosen, 1);
+            count += alone.iter().max().unwrap();
+            // Equal up to the numbering: pieces and pairs of numbers are as many.
+            let pairs: BTreeSet<_> =
+                (0..504).filter(|n| chosen[*n]).map(|n| (alone[n], number[n])).collect();
+            assert_eq!(pairs.len(), *alone.iter().max().unwrap() as usize);
+        }
+        assert_eq!(sizes.len(), count as usize);
     }
 
     #[test]

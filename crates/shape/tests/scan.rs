@@ -245,3 +245,33 @@ fn a_real_packing_is_separated_as_others_do() {
         }
     }
 }
+
+/// Two touching cubes of different labels and a separate piece of the first label.
+#[test]
+fn touching_labels_stay_apart_when_they_are_split() {
+    let n = 24;
+    let label = |at: usize| match (at % n, at / n % n, at / n / n) {
+        (3..11, 4..12, 4..12) | (3..11, 4..12, 15..22) => 3,
+        (11..19, 4..12, 4..12) => 900,
+        _ => 0,
+    };
+    let labels: Vec<u32> = (0..n * n * n).map(label).collect();
+    let volume = Volume::from_labels([n; 3], labels).unwrap();
+    let split = ScanOptions { split: true, ..options() };
+    let grains = shapes_from_volume(&volume, &SourceFile::default(), &split).unwrap();
+    assert_eq!(grains.iter().map(|g| g.voxels).collect::<Vec<_>>(), [512, 512, 448]);
+}
+
+#[test]
+fn the_default_number_of_cells_is_lowered_for_small_grains_and_another_is_kept() {
+    let volume = voxelised(DVec3::splat(10.0), DQuat::IDENTITY, DVec3::new(0.21, 0.37, 0.11));
+    let across = |cells: usize| {
+        let shape =
+            ShapeOptions { cells, nodes: Some(100), roundness: false, ..Default::default() };
+        let record = only(&volume, &ScanOptions { shape, ..options() }).unwrap().record();
+        record.a_m / record.field_spacing_m.unwrap()
+    };
+    println!("{} {}", across(56), across(90));
+    assert!((24.0..27.0).contains(&across(56)));
+    assert!((88.0..92.0).contains(&across(90)));
+}

@@ -5,6 +5,7 @@ use super::regions::{Region, crop, cuts};
 use super::segments::Segments;
 use super::threshold::median;
 use super::{Mask, ScanOptions, smooth, transform};
+use crate::assemble::ShapeOptions;
 use crate::error::{Defect, Result, ShapeError, first_few};
 use crate::filter::refine;
 use crate::grid::{coordinates, index, place};
@@ -22,7 +23,7 @@ const FEWEST: u64 = 64;
 /// Number of cells across a grain below which the smoothed field is refined before surface
 /// extraction, for grey values and for a mask.
 const FINE: [usize; 2] = [40, 64];
-/// Cells of the final field per voxel across a grain, and the minimum number of cells.
+/// Default cells of the final field per voxel across a grain, and their minimum number.
 const CELLS: (f64, usize) = (1.25, 24);
 /// Smoothing for grey values and for a mask [voxels].
 const SMOOTHING: [f64; 2] = [1.1, 1.5];
@@ -118,8 +119,10 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     provenance.source.clone_from(&source.name);
     provenance.source_sha256.clone_from(&source.sha256);
     let mut finish = options.shape.clone();
-    let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
-    finish.cells = finish.cells.min(enough);
+    if finish.cells == ShapeOptions::default().cells {
+        let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
+        finish.cells = finish.cells.min(enough);
+    }
     let places = cuts(dims, labels, label, region);
     let surface = Surface::Scanned {
         image: image.map(|(weight, deviation)| (weight, options.voxel * deviation)),

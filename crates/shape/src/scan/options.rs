@@ -19,7 +19,7 @@ pub struct ScanOptions {
     /// Whether to apply a median of 27 voxels before the threshold. Surfaces are located in the
     /// unfiltered image.
     pub median: bool,
-    /// Whether to treat each connected piece of the solid voxels as a grain.
+    /// Whether to treat each connected piece of the solid voxels, or of each label, as a grain.
     pub split: bool,
     /// Separates touching grains. Two maxima of the distance from the void are two grains if the
     /// neck between them is narrower than this fraction of the smaller one (0.87 did best on
@@ -38,8 +38,8 @@ pub struct ScanOptions {
     pub rescue: bool,
     /// Whether to try on the refused labels which options would accept them.
     pub advise: bool,
-    /// Resolution, nodes and bounds. Small grains get fewer cells: 1.25 times the number of voxels
-    /// across them, but at least 24.
+    /// Resolution, nodes and bounds. With the default number of cells, small grains get fewer: 1.25
+    /// times the number of voxels across them, but at least 24. More add no detail.
     pub shape: ShapeOptions,
 }
 

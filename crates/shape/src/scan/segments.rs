@@ -113,11 +113,7 @@ fn divide(
     progress: Progress,
 ) -> Result<Vec<u32>> {
     let Some(neck) = options.separate else {
-        return Ok(if options.split {
-            pieces(dims, |n| labels[n] != 0).0
-        } else {
-            labels.to_vec()
-        });
+        return Ok(if options.split { pieces(dims, |n| labels[n]).0 } else { labels.to_vec() });
     };
     progress("separate", 0, 1);
     let mut mask = Mask { dims, solid: labels.iter().map(|l| *l != 0).collect() };
