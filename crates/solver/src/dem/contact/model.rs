@@ -327,12 +327,19 @@ impl FrictionStep {
         let sliding = tangential(sliding);
         let direction = sliding.normalize_or_zero();
         let damping = pair.stable_damping(self.damping, point.lever_arm, direction, self.step);
-        // Coulomb's bound (Eq. 15) holds for the spring and for the sum with the dashpot; an
-        // attractive normal force carries no friction.
+        let viscous = damping * sliding;
+        let force = -(self.stiffness * displacement + viscous);
+        // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
         let limit = self.coefficient * normal_force.max(0.0);
-        let displacement = displacement.clamp_length_max(limit / self.stiffness);
-        let force = -(self.stiffness * displacement + damping * sliding);
-        (force.clamp_length_max(limit), displacement)
+        if force.length_squared() <= limit * limit {
+            return (force, displacement);
+        }
+        let force = force * (limit / force.length());
+        let displacement = -(force + viscous) / self.stiffness;
+        // A dashpot that reaches the bound alone must not wind the spring backwards: the friction
+        // would lag behind a normal force that grows.
+        let backwards = displacement.dot(force) > 0.0;
+        (force, if backwards { DVec3::ZERO } else { displacement })
     }
 }
 
