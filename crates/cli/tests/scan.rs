@@ -106,3 +106,36 @@ fn specks_are_told_and_a_second_body_is_rejected_with_the_option() {
     let told = from_scan(folder.path(), &image(5.0), &["--force", "--largest-piece"], 0);
     assert!(told.contains("specks removed from 1 grain, at most 7."), "{told}");
 }
+
+#[test]
+fn the_voxel_size_of_the_file_is_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = folder.path().join("image.nrrd");
+    let ball = |n: usize| {
+        let x = [n % 24, n / 24 % 24, n / 576].map(|i| i as f64 - 11.5);
+        u8::from(x.iter().map(|x| x * x).sum::<f64>() < 64.0)
+    };
+    let voxels: Vec<u8> = (0..24 * 24 * 24).map(ball).collect();
+    let run = |spacings: &str, voxel: &str, code: i32| {
+        let units = "units: \"um\" \"um\" \"um\"";
+        let header = format!(
+            "NRRD0004\ntype: uint8\nsizes: 24 24 24\nencoding: raw\n{units}\n\
+             spacings: {spacings}\n\n"
+        );
+        std::fs::write(&image, [header.as_bytes(), &voxels].concat()).unwrap();
+        let mut program = grainwake();
+        program.args(["grain", "from-scan", "--no-roundness", "--force"]).arg(&image);
+        program.args(["--voxel", voxel, "-o"]).arg(folder.path().join("ball.grain"));
+        let done = program.assert().code(code);
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let message = run("20 20 20", "20 um", 0);
+    assert!(!message.contains("note:"), "{message}");
+    let message = run("20 20 20", "20 mm", 0);
+    assert!(
+        message.contains("image.nrrd states voxels of 20 um, unlike --voxel 20 mm"),
+        "{message}"
+    );
+    let message = run("20 20 50", "20 um", 2);
+    assert!(message.contains("20 x 20 x 50 um") && message.contains("resample"), "{message}");
+}

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use grainwake_shape::render::{Picture, View};
-use grainwake_shape::scan::{Scan, ScanOptions, ScannedGrain, Threshold, read_volume, scan_volume};
+use grainwake_shape::scan::{
+    Scan, ScanOptions, ScannedGrain, Threshold, read_volume_and_voxel, scan_volume,
+};
 use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -37,7 +39,14 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         how.shape.roundness = false;
     }
     let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
-    let (volume, source) = read_volume(&args.image, &limits)?;
+    let (volume, source, stated) = read_volume_and_voxel(&args.image, &limits)?;
+    if let Some(stated) = stated.filter(|stated| stated.contradicts(how.voxel)) {
+        tell!(
+            "note: {} states voxels of {stated}, unlike --voxel {}; the grains have the size of --voxel",
+            args.image.display(),
+            args.voxel
+        );
+    }
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{msg:10} {bar:40} {pos}/{len} {eta}") {
         bar.set_style(style);

@@ -1,8 +1,9 @@
-//! Volumes with a text header: NRRD (`.nrrd`, `.nhdr`) and MetaImage (`.mha`, `.mhd`). Voxels are
-//! raw or gzipped, in the header's file or in a separate one.
+//! Decoding of volumes with a text header, NRRD and MetaImage: voxels are raw or compressed, in the
+//! header's file or in a separate one.
 //!
-//! Parsed here, because there is no dedicated crate for NRRD or MetaImage headers.
+//! Headers are parsed here, because there is no dedicated crate for NRRD or MetaImage headers.
 
+use super::geometry::{Geometry, StatedVoxel, mirror};
 use super::npy::Number;
 use super::volume::{Volume, count};
 use crate::error::{Result, ShapeError};
@@ -12,24 +13,27 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 /// Maximum header size [bytes].
-const LONGEST: usize = 1 << 16;
+pub(super) const LONGEST: usize = 1 << 16;
 
 /// Content of a header.
 #[derive(Default)]
-struct Fields {
-    sizes: Vec<u64>,
+pub(super) struct Header {
+    pub sizes: Vec<u64>,
     /// Kind and width [bytes] of the numbers, as in [`Number`].
-    number: Option<(u8, usize)>,
-    big: bool,
-    packed: Packed,
+    pub number: Option<(u8, usize)>,
+    pub big: bool,
+    pub packed: Packed,
     /// File with the voxels; `None` if they follow the header.
-    data_file: Option<String>,
+    pub data_file: Option<String>,
     /// Bytes before the voxels; -1 to read them from the end of the file.
-    skip: i64,
+    pub skip: i64,
+    /// Voxel size and axes, if stated.
+    pub geometry: Option<Geometry>,
 }
 
+/// Compression of the voxels.
 #[derive(Default, PartialEq)]
-enum Packed {
+pub(super) enum Packed {
     #[default]
     Raw,
     Gzip,
@@ -37,137 +41,46 @@ enum Packed {
     Other,
 }
 
-pub(super) fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    let malformed = |reason: &str| ShapeError::malformed(path, reason);
-    if !bytes.starts_with(b"NRRD000") {
-        return Err(malformed("it does not begin with the NRRD signature"));
-    }
-    // The header ends at the first empty line, or at the end of a detached header file.
-    let head = &bytes[..bytes.len().min(LONGEST)];
-    let end = head.windows(2).position(|w| w == b"\n\n").map(|n| (n, n + 2));
-    let end = end.or_else(|| head.windows(4).position(|w| w == b"\r\n\r\n").map(|n| (n, n + 4)));
-    let (text_end, start) = end.unwrap_or((head.len(), head.len()));
-    let text = String::from_utf8_lossy(&bytes[..text_end]);
-    let mut fields = Fields::default();
-    for line in text.lines().skip(1).filter(|l| !l.starts_with('#')) {
-        let Some((key, value)) = line.split_once(": ") else {
-            continue;
-        };
-        let value = value.trim();
-        match key.trim().to_ascii_lowercase().as_str() {
-            "sizes" => fields.sizes = sizes(value),
-            "type" => fields.number = nrrd_type(value),
-            "endian" => fields.big = value.eq_ignore_ascii_case("big"),
-            "encoding" => {
-                fields.packed = match value.to_ascii_lowercase().as_str() {
-                    "raw" => Packed::Raw,
-                    "gzip" | "gz" => Packed::Gzip,
-                    _ => Packed::Other,
-                }
-            }
-            "data file" | "datafile" => fields.data_file = Some(value.to_owned()),
-            "byte skip" | "byteskip" => {
-                fields.skip =
-                    skip(value).ok_or_else(|| malformed("byte skip is not 0, 1, ... or -1"))?;
-            }
-            _ => {}
-        }
-    }
-    if end.is_none() && fields.data_file.is_none() {
-        return Err(malformed("the NRRD header does not end"));
-    }
-    voxels(path, fields, &bytes[start..], limits)
-}
-
-pub(super) fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    let malformed = |reason: &str| ShapeError::malformed(path, reason);
-    let mut fields = Fields::default();
-    let mut at = 0;
-    // The data file name is the last line of the header.
-    while fields.data_file.is_none() {
-        let rest = &bytes[at..bytes.len().min(LONGEST).max(at)];
-        let Some(end) = rest.iter().position(|b| *b == b'\n') else {
-            return Err(malformed("the MetaImage header names no ElementDataFile"));
-        };
-        let line = String::from_utf8_lossy(&rest[..end]).into_owned();
-        at += end + 1;
-        let Some((key, value)) = line.split_once('=') else {
-            continue;
-        };
-        let value = value.trim();
-        let yes = value.eq_ignore_ascii_case("true");
-        match key.trim() {
-            "DimSize" => fields.sizes = sizes(value),
-            "ElementType" => fields.number = meta_type(value),
-            "BinaryDataByteOrderMSB" | "ElementByteOrderMSB" => fields.big = yes,
-            "CompressedData" if yes => fields.packed = Packed::Zlib,
-            "HeaderSize" => {
-                fields.skip =
-                    skip(value).ok_or_else(|| malformed("HeaderSize is not 0, 1, ... or -1"))?;
-            }
-            "ElementDataFile" => fields.data_file = Some(value.to_owned()),
-            _ => {}
-        }
-    }
-    if fields.data_file.as_deref() == Some("LOCAL") {
-        fields.data_file = None;
-    }
-    voxels(path, fields, &bytes[at..], limits)
-}
-
-fn sizes(value: &str) -> Vec<u64> {
+/// Parses the sizes of the axes.
+pub(super) fn sizes(value: &str) -> Vec<u64> {
     // An unreadable number becomes 0 and is refused as an empty axis.
     value.split_whitespace().map(|n| n.parse().unwrap_or(0)).collect()
 }
 
-fn skip(value: &str) -> Option<i64> {
+/// Parses a number of bytes to skip.
+pub(super) fn skip(value: &str) -> Option<i64> {
     value.parse().ok().filter(|n| *n >= -1)
 }
 
-fn nrrd_type(value: &str) -> Option<(u8, usize)> {
-    let (kind, width) = match value.to_ascii_lowercase().as_str() {
-        "signed char" | "int8" | "int8_t" => (b'i', 1),
-        "uchar" | "unsigned char" | "uint8" | "uint8_t" => (b'u', 1),
-        "short" | "short int" | "signed short" | "int16" | "int16_t" => (b'i', 2),
-        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => (b'u', 2),
-        "int" | "signed int" | "int32" | "int32_t" => (b'i', 4),
-        "uint" | "unsigned int" | "uint32" | "uint32_t" => (b'u', 4),
-        "float" => (b'f', 4),
-        "double" => (b'f', 8),
-        _ => return None,
-    };
-    Some((kind, width))
+/// Parses `N` numbers separated by white space, commas or brackets.
+pub(super) fn numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
+    let parts = value.split(|c: char| c.is_whitespace() || ",()".contains(c));
+    let numbers = parts.filter(|part| !part.is_empty()).map(|part| part.parse().ok());
+    numbers.collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
-fn meta_type(value: &str) -> Option<(u8, usize)> {
-    let (kind, width) = match value {
-        "MET_CHAR" => (b'i', 1),
-        "MET_UCHAR" => (b'u', 1),
-        "MET_SHORT" => (b'i', 2),
-        "MET_USHORT" => (b'u', 2),
-        "MET_INT" => (b'i', 4),
-        "MET_UINT" => (b'u', 4),
-        "MET_FLOAT" => (b'f', 4),
-        "MET_DOUBLE" => (b'f', 8),
-        _ => return None,
-    };
-    Some((kind, width))
-}
-
-fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Result<Volume> {
+/// Reads the voxels that a header describes, from the bytes after it or from another file. The x
+/// axis is reversed if the axes are left-handed.
+pub(super) fn voxels(
+    path: &Path,
+    header: Header,
+    own: &[u8],
+    limits: &ReadLimits,
+) -> Result<(Volume, Option<StatedVoxel>)> {
     let unsupported = |reason: String| ShapeError::unsupported(path, reason);
-    let [nx, ny, nz] = fields.sizes[..] else {
-        return Err(unsupported(format!("the image has sizes {:?}; a volume has 3", fields.sizes)));
+    let [nx, ny, nz] = header.sizes[..] else {
+        return Err(unsupported(format!("the image has sizes {:?}; a volume has 3", header.sizes)));
     };
     let voxels = count(path, [nx, ny, nz], limits)? as u64;
-    let Some((kind, width)) = fields.number else {
+    let stated = header.geometry.as_ref().map(|geometry| geometry.voxel(path)).transpose()?;
+    let Some((kind, width)) = header.number else {
         let reason = "the type of the voxels is missing or unknown; save integers or floating-point \
                       numbers";
         return Err(unsupported(reason.into()));
     };
-    let number = Number { big: fields.big, kind, width };
+    let number = Number { big: header.big, kind, width };
     let apart;
-    let data = match &fields.data_file {
+    let data = match &header.data_file {
         None => own,
         Some(name) if name.contains(['/', '\\', ' ']) || name == "LIST" || name.contains('%') => {
             return Err(unsupported(format!(
@@ -188,15 +101,15 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
         }
     };
     let needed = voxels * number.width as u64;
-    let raw = fields.packed == Packed::Raw;
-    let skip = match fields.skip {
+    let raw = header.packed == Packed::Raw;
+    let skip = match header.skip {
         -1 if raw => (data.len() as u64).saturating_sub(needed),
         -1 => return Err(unsupported("a byte skip of -1 is for raw voxels".into())),
         skip => skip as u64,
     };
     let data = data.get(usize::try_from(skip).unwrap_or(usize::MAX)..).unwrap_or(&[]);
     // Surplus data indicates slices that would be lost without notice.
-    if let Some(name) = fields.data_file.filter(|_| raw && data.len() as u64 > needed) {
+    if let Some(name) = header.data_file.filter(|_| raw && data.len() as u64 > needed) {
         return Err(unsupported(format!(
             "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
              has {} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
@@ -205,26 +118,50 @@ fn voxels(path: &Path, fields: Fields, own: &[u8], limits: &ReadLimits) -> Resul
             data.len()
         )));
     }
-    let dims = [nx, ny, nz].map(|n| n as usize);
-    let unpacked: &mut dyn Read = match fields.packed {
-        Packed::Raw => return number.volume(path, dims, false, data),
-        Packed::Gzip => &mut MultiGzDecoder::new(data),
-        Packed::Zlib => &mut ZlibDecoder::new(data),
+    let mut plain = Vec::new();
+    let data = match header.packed {
+        Packed::Raw => data,
+        Packed::Gzip => unpack(path, MultiGzDecoder::new(data), needed, &mut plain)?,
+        Packed::Zlib => unpack(path, ZlibDecoder::new(data), needed, &mut plain)?,
         Packed::Other => {
             let reason = "the voxels are neither raw nor gzipped; save them so";
             return Err(unsupported(reason.into()));
         }
     };
-    let mut plain = Vec::new();
-    let read = unpacked.take(needed + 1).read_to_end(&mut plain);
+    let dims = [nx, ny, nz].map(|n| n as usize);
+    let mut volume = number.volume(path, dims, false, data)?;
+    if header.geometry.is_some_and(|geometry| geometry.mirrored()) {
+        mirror(&mut volume);
+    }
+    Ok((volume, stated))
+}
+
+/// Decompresses `needed` bytes, and one more if there are more.
+fn unpack<'a>(
+    path: &Path,
+    packed: impl Read,
+    needed: u64,
+    plain: &'a mut Vec<u8>,
+) -> Result<&'a [u8]> {
+    let read = packed.take(needed + 1).read_to_end(plain);
     read.map_err(|e| ShapeError::malformed(path, format!("packed voxels: {e}")))?;
-    number.volume(path, dims, false, &plain)
+    Ok(plain)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::volume::Voxels;
+    use super::super::{meta, nrrd};
     use super::*;
     use std::io::Write;
+
+    fn read_nrrd(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+        nrrd::read(path, bytes, limits).map(|(volume, _)| volume)
+    }
+
+    fn read_meta(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+        meta::read(path, bytes, limits).map(|(volume, _)| volume)
+    }
 
     fn limits() -> ReadLimits {
         ReadLimits { voxels: 1 << 20, ..Default::default() }
@@ -292,5 +229,72 @@ mod tests {
             read_nrrd(&path, huge.as_bytes(), &limits()),
             Err(ShapeError::TooLarge { .. })
         ));
+    }
+
+    /// Reads `more` header lines with six labels of one byte: sizes, volume and stated voxel.
+    fn nrrd_with(more: &str) -> Result<(Volume, Option<StatedVoxel>)> {
+        let head = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 3 2 1\nencoding: raw\n";
+        let bytes = [format!("{head}{more}\n").as_bytes(), &[0, 1, 2, 3, 4, 5]].concat();
+        nrrd::read(Path::new("a.nrrd"), &bytes, &limits())
+    }
+
+    fn meta_with(more: &str) -> Result<(Volume, Option<StatedVoxel>)> {
+        let head = "NDims = 3\nDimSize = 3 2 1\nElementType = MET_UCHAR\n";
+        let text = format!("{head}{more}ElementDataFile = LOCAL\n");
+        let bytes = [text.as_bytes(), &[0, 1, 2, 3, 4, 5]].concat();
+        meta::read(Path::new("a.mha"), &bytes, &limits())
+    }
+
+    #[test]
+    fn voxel_edges_are_read_and_must_be_equal() {
+        let edge = |read: Result<(Volume, Option<StatedVoxel>)>| read.unwrap().1.unwrap();
+        let stated = edge(nrrd_with("spacings: 0.01 0.01 0.01\nunits: \"mm\" \"mm\" \"mm\"\n"));
+        assert_eq!(stated.to_string(), "0.01 mm");
+        let space = "space directions: (0,0.01,0) (0,0,0.01) (0.01,0,0)\n\
+                     space units: \"mm\" \"mm\" \"mm\"\n";
+        assert_eq!(edge(nrrd_with(space)).to_string(), "0.01 mm");
+        assert_eq!(edge(meta_with("ElementSpacing = 2 2 2\n")).to_string(), "2 (no unit)");
+        let unit = "ElementSize = 2 2 2\nDistanceUnits = um\n";
+        assert_eq!(edge(meta_with(unit)).to_string(), "2 um");
+        assert_eq!(nrrd_with("spacings: NaN NaN NaN\n").unwrap().1, None);
+        assert_eq!(nrrd_with("spacings:=1 1 2\n").unwrap().1, None);
+        assert_eq!(meta_with("").unwrap().1, None);
+        for (read, key) in [
+            (nrrd_with("spacings: 1 1 2.5\n"), "spacings: the voxel is 1 x 1 x 2.5"),
+            (
+                nrrd_with("space directions: (1,0,0) (0,1,0) (0,0,2.5)\n"),
+                "space directions: the voxel is 1 x 1 x 2.5",
+            ),
+            (nrrd_with("space directions: none (0,1,0) (0,0,1)\n"), "three vectors"),
+            (nrrd_with("spacings: 1 1 1\nunits: \"mm\" \"mm\" \"um\"\n"), "one unit"),
+            (meta_with("ElementSpacing = 1 1 2.5\n"), "ElementSpacing: the voxel is 1 x 1 x 2.5"),
+            (meta_with("ElementSpacing = 1 1\n"), "ElementSpacing: \"1 1\" is not 3 numbers"),
+            (meta_with("TransformMatrix = 1 0 0 0 1 0 0.6 0 0.8\n"), "not perpendicular"),
+        ] {
+            let message = read.unwrap_err().to_string();
+            assert!(message.contains(key), "`{key}` is missing in: {message}");
+        }
+    }
+
+    /// Left-handed axes hold the mirror image, right-handed ones the object.
+    #[test]
+    fn left_handed_axes_are_mirrored() {
+        let labels = |read: Result<(Volume, Option<StatedVoxel>)>| read.unwrap().0.voxels;
+        let (plain, mirrored) = (vec![0, 1, 2, 3, 4, 5], vec![2, 1, 0, 5, 4, 3]);
+        let (plain, mirrored) = (Voxels::Labels(plain), Voxels::Labels(mirrored));
+        let nrrd = |space: &str, steps: &str| {
+            labels(nrrd_with(&format!("space: {space}\nspace directions: {steps}\n")))
+        };
+        let lps = "left-posterior-superior";
+        assert_eq!(nrrd(lps, "(1,0,0) (0,1,0) (0,0,1)"), plain);
+        assert_eq!(nrrd(lps, "(-1,0,0) (0,1,0) (0,0,1)"), mirrored);
+        assert_eq!(nrrd(lps, "(-1,0,0) (0,-1,0) (0,0,1)"), plain);
+        assert_eq!(nrrd(lps, "(0,1,0) (1,0,0) (0,0,1)"), mirrored);
+        assert_eq!(nrrd("LAS", "(1,0,0) (0,1,0) (0,0,1)"), mirrored);
+        let meta = |axes: &str| labels(meta_with(&format!("TransformMatrix = {axes}\n")));
+        assert_eq!(meta("1 0 0 0 1 0 0 0 1"), plain);
+        assert_eq!(meta("-1 0 0 0 1 0 0 0 1"), mirrored);
+        assert_eq!(meta("0 1 0 0 0 1 1 0 0"), plain);
+        assert_eq!(meta("0 1 0 1 0 0 0 0 1"), mirrored);
     }
 }

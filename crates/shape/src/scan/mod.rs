@@ -16,13 +16,17 @@
 
 mod build;
 mod cure;
+mod description;
 mod field_of_view;
+mod geometry;
 mod grain;
 mod grey;
 mod header;
 mod looks_grey;
+mod meta;
 mod npy;
 mod npz;
+mod nrrd;
 mod options;
 mod read;
 mod refusals;
@@ -38,8 +42,9 @@ mod watershed;
 
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
 pub use cure::Cure;
+pub use geometry::StatedVoxel;
 pub use options::ScanOptions;
-pub use read::read_volume;
+pub use read::{read_volume, read_volume_and_voxel};
 pub use refusals::{Advice, Refusal};
 pub use segments::Masked;
 pub use threshold::Threshold;

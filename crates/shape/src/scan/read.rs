@@ -1,23 +1,36 @@
 //! Choice of the reader of an image by its file name.
 
+use super::geometry::StatedVoxel;
 use super::volume::Volume;
+use super::{meta, npy, npz, nrrd, slices, tiff};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use std::path::Path;
 
+type Reader = fn(&Path, &[u8], &ReadLimits) -> Result<(Volume, Option<StatedVoxel>)>;
+
 /// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, integer or floating-point, including
 /// BigTIFF), a folder of TIFF slices, an NPY array indexed [z][y][x], an NPZ archive with one
-/// array, NRRD or MetaImage (with voxels inside, or raw in a separate file).
+/// array, NRRD or MetaImage (with voxels inside, or raw in a separate file). Voxels that are not
+/// cubes are refused. If the axes of a header are left-handed, the x axis is reversed.
 pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFile)> {
+    read_volume_and_voxel(path, limits).map(|(volume, source, _)| (volume, source))
+}
+
+/// Reads a 3-D image as [`read_volume`] does, and the edge length of a voxel if the file states it.
+pub fn read_volume_and_voxel(
+    path: &Path,
+    limits: &ReadLimits,
+) -> Result<(Volume, SourceFile, Option<StatedVoxel>)> {
     if path.is_dir() {
-        return super::slices::read(path, limits);
+        return slices::read(path, limits);
     }
-    let reader = match extension(path).as_str() {
-        "tif" | "tiff" => super::tiff::read,
-        "npy" => super::npy::read,
-        "npz" => super::npz::read,
-        "nrrd" | "nhdr" => super::header::read_nrrd,
-        "mha" | "mhd" => super::header::read_meta,
+    let reader: Reader = match extension(path).as_str() {
+        "tif" | "tiff" => tiff::read,
+        "npy" => |path, bytes, limits| Ok((npy::read(path, bytes, limits)?, None)),
+        "npz" => |path, bytes, limits| Ok((npz::read(path, bytes, limits)?, None)),
+        "nrrd" | "nhdr" => nrrd::read,
+        "mha" | "mhd" => meta::read,
         _ => {
             let reason = "unknown file type; supported: .tif, .tiff, .npy, .npz, .nrrd, .nhdr, \
                           .mha, .mhd, or a folder of .tif slices";
@@ -25,6 +38,6 @@ pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFi
         }
     };
     let (bytes, source) = read_bytes(path, limits)?;
-    let volume = reader(path, &bytes, limits)?;
-    Ok((volume, source))
+    let (volume, voxel) = reader(path, &bytes, limits)?;
+    Ok((volume, source, voxel))
 }

@@ -1,5 +1,6 @@
 //! A folder of slices: one TIFF per slice, ordered by the numbers in the file names.
 
+use super::geometry::StatedVoxel;
 use super::tiff;
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
@@ -7,7 +8,10 @@ use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFile)> {
+/// Volume of a folder, identity of the files, and the voxel edge that the first one states.
+pub(super) type Slices = (Volume, SourceFile, Option<StatedVoxel>);
+
+pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<Slices> {
     let io = |e| ShapeError::io(folder, e);
     let mut files: Vec<PathBuf> = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(io)? {
@@ -23,10 +27,12 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
     let mut dims = [0; 3];
     let mut voxels = Voxels::Labels(Vec::new());
     let mut digest = Sha256::new();
+    let mut voxel = None;
     for path in &files {
         let (bytes, source) = read_bytes(path, limits)?;
         digest.update(source.sha256.as_bytes());
-        let slice = tiff::read(path, &bytes, limits)?;
+        let (slice, stated) = tiff::read(path, &bytes, limits)?;
+        voxel = voxel.or(stated);
         if slice.dims[2] != 1 || (dims[2] > 0 && slice.dims[..2] != dims[..2]) {
             let reason = format!(
                 "{} x {} voxels on {} pages, unlike the slice before; every slice must have one \
@@ -46,7 +52,7 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<(Volume, Source
         return Err(ShapeError::unsupported(folder, reason));
     }
     let volume = Volume::from_voxels(folder, dims, voxels)?;
-    Ok((volume, SourceFile::new(folder, digest)))
+    Ok((volume, SourceFile::new(folder, digest), voxel))
 }
 
 /// Describes missing or duplicate numbers among slices whose names differ in one number only. The
@@ -130,7 +136,7 @@ mod tests {
         write("slice_10.tif", 2, &[5, 6]);
         write("slice_9.tif", 2, &[3, 4]);
         write("slice_8.tif", 2, &[1, 2]);
-        let (volume, source) = read(folder.path(), &limits).unwrap();
+        let (volume, source, _) = read(folder.path(), &limits).unwrap();
         assert_eq!(volume, Volume::from_labels([2, 1, 3], vec![1, 2, 3, 4, 5, 6]).unwrap());
         assert_eq!(source.sha256.len(), 64);
         write("slice_11.tif", 1, &[7]);

@@ -1,20 +1,38 @@
 //! Multi-page TIFF, greyscale, one page per slice along z.
 
+use super::description::Description;
+use super::geometry::StatedVoxel;
 use super::volume::{Volume, Voxels, count};
 use crate::error::{Result, ShapeError};
 use crate::limits::ReadLimits;
 use std::io::Cursor;
 use std::path::Path;
 use tiff::ColorType;
+use tiff::decoder::ifd::Value;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
 /// Upper bound of the compression ratio of all TIFF codecs; pages that declare more are refused.
 const BEST_RATIO: u64 = 5000;
 
-pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
+pub(super) fn read(
+    path: &Path,
+    bytes: &[u8],
+    limits: &ReadLimits,
+) -> Result<(Volume, Option<StatedVoxel>)> {
     let malformed = |e: &dyn std::fmt::Display| ShapeError::malformed(path, e);
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
+    let memory = |page: usize| {
+        let mut memory = Limits::default();
+        memory.decoding_buffer_size = page;
+        memory.intermediate_buffer_size = 1 << 30;
+        memory.ifd_value_size = bytes.len();
+        memory
+    };
+    let decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| malformed(&e))?;
+    let mut decoder = decoder.with_limits(memory(bytes.len()));
+    let description = description(&mut decoder);
+    description.check_stack(path)?;
+    let stated = description.voxel(path)?;
     let mut first: Option<(u32, u32, ColorType)> = None;
     let mut all = Voxels::Labels(Vec::new());
     let mut pages = 0u64;
@@ -43,11 +61,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
                 bytes.len()
             )));
         }
-        let mut own = Limits::default();
-        own.decoding_buffer_size = size as usize;
-        own.intermediate_buffer_size = 1 << 30;
-        own.ifd_value_size = bytes.len();
-        decoder = decoder.with_limits(own);
+        decoder = decoder.with_limits(memory(size as usize));
         let decoded = decoder.read_image().map_err(|e| malformed(&format!("page {pages}: {e}")))?;
         let voxels = voxels(decoded);
         if voxels.len() as u64 != u64::from(width) * u64::from(height) {
@@ -60,36 +74,27 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         }
         decoder.next_image().map_err(|e| malformed(&e))?;
     }
-    check_claimed_slices(path, &mut decoder, pages)?;
+    // ImageJ stacks over 4 GiB have one page, with the number of slices in the description.
+    if let Some(claimed) = description.images.filter(|images| pages == 1 && *images > 1) {
+        let reason = format!(
+            "the description states {claimed} slices, but the file has one page (ImageJ writes \
+             large stacks so); save it as NPY or as a true multi-page TIFF"
+        );
+        return Err(ShapeError::unsupported(path, reason));
+    }
     let (width, height, _) = first.unwrap_or((0, 0, ColorType::Gray(8)));
     let dims = [width as usize, height as usize, pages as usize];
-    Volume::from_voxels(path, dims, all)
+    Ok((Volume::from_voxels(path, dims, all)?, stated))
 }
 
-/// Refuses ImageJ stacks over 4 GiB, stored as one page with the slice count in the description.
-fn check_claimed_slices(
-    path: &Path,
-    decoder: &mut Decoder<Cursor<&[u8]>>,
-    pages: u64,
-) -> Result<()> {
-    if pages > 1 {
-        return Ok(());
-    }
-    let description = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
-    let claimed = description
-        .lines()
-        .find_map(|line| line.trim().strip_prefix("images="))
-        .and_then(|n| n.parse::<u64>().ok());
-    match claimed {
-        Some(claimed) if claimed > 1 => {
-            let reason = format!(
-                "the description states {claimed} slices, but the file has one page (ImageJ writes \
-                 large stacks so); save it as NPY or as a true multi-page TIFF"
-            );
-            Err(ShapeError::unsupported(path, reason))
-        }
-        _ => Ok(()),
-    }
+/// Returns the description of the first page.
+fn description(decoder: &mut Decoder<Cursor<&[u8]>>) -> Description {
+    let resolution = [Tag::XResolution, Tag::YResolution].map(|tag| match decoder.find_tag(tag) {
+        Ok(Some(Value::Rational(pixels, unit))) => Some(f64::from(pixels) / f64::from(unit)),
+        _ => None,
+    });
+    let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
+    Description::parse(&text, resolution)
 }
 
 /// Returns the voxels of a page: labels if every value is one, and grey values otherwise.
@@ -137,7 +142,7 @@ mod tests {
     }
 
     fn open(bytes: &[u8]) -> Result<Volume> {
-        read(Path::new("a.tif"), bytes, &ReadLimits::default())
+        read(Path::new("a.tif"), bytes, &ReadLimits::default()).map(|(volume, _)| volume)
     }
 
     #[test]
