@@ -55,43 +55,49 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<Slices> {
     Ok((volume, SourceFile::new(folder, digest), voxel))
 }
 
-/// Describes missing or duplicate numbers among slices whose names differ in one number only. The
-/// numbers may have a constant increment such as two or ten.
+/// Describes what keeps the files from being one series of slices: names that differ in more than
+/// one number, and missing or duplicate numbers. The numbers may have a constant increment such as
+/// two or ten.
 fn gap(files: &[PathBuf]) -> Option<String> {
     let name = |n: usize| files[n].file_name().unwrap_or_default().to_string_lossy();
     let keys: Vec<_> = files.iter().map(|path| by_number(path)).collect();
-    // Adjacent slices with the numbers that distinguish them.
-    let adjacent = |(n, pair): (usize, &[Vec<(u128, String)>])| {
-        let (one, next) = (&pair[0], &pair[1]);
-        let alike = one.len() == next.len() && one.iter().zip(next).all(|(p, q)| p.1 == q.1);
-        let numbers = one.iter().zip(next).map(|(p, q)| (p.0, q.0));
-        let (low, high) = numbers.clone().find(|(p, q)| p != q).unwrap_or((0, 0));
-        let differ = numbers.filter(|(p, q)| p != q).count();
-        (alike && differ <= 1).then_some((n, low, high))
-    };
-    let pairs: Vec<_> = keys.windows(2).enumerate().filter_map(adjacent).collect();
-    let step = pairs.iter().map(|(_, low, high)| high - low).min()?;
+    let first = keys.first()?;
+    // Place of the slice number in the key.
+    let mut place = None;
+    for (n, key) in keys.iter().enumerate().skip(1) {
+        let alike = key.len() == first.len() && key.iter().zip(first).all(|(p, q)| p.1 == q.1);
+        let mut differ = (0..first.len().min(key.len())).filter(|m| key[*m].0 != first[*m].0);
+        if !alike || differ.any(|m| *place.get_or_insert(m) != m) {
+            return Some(format!(
+                "{} and {} differ in more than the slice number; keep one series of slices in the \
+                 folder, with names that differ in one number",
+                name(0),
+                name(n)
+            ));
+        }
+    }
+    let number = |n: usize| keys[n][place.unwrap_or(0)].0;
+    let pairs = || (1..files.len()).map(|n| (n - 1, number(n - 1), number(n)));
+    let step = pairs().map(|(_, low, high)| high - low).min()?;
     if step == 0 {
-        let (n, ..) = pairs.iter().find(|(_, low, high)| low == high)?;
+        let (n, ..) = pairs().find(|(_, low, high)| low == high)?;
         return Some(format!(
             "{} and {} have the same number; leave one of them",
-            name(*n),
+            name(n),
             name(n + 1)
         ));
     }
-    let (n, ..) = pairs.iter().find(|(_, low, high)| high - low > step)?;
-    let between = |(_, low, high): &(usize, u128, u128)| {
-        let high = *high;
+    let (n, ..) = pairs().find(|(_, low, high)| high - low > step)?;
+    let between = |(_, low, high): (usize, u128, u128)| {
         std::iter::successors(Some(low + step), move |m| Some(m + step))
             .take_while(move |m| *m < high)
     };
-    let missing: Vec<String> =
-        pairs.iter().flat_map(between).take(11).map(|m| m.to_string()).collect();
+    let missing: Vec<String> = pairs().flat_map(between).take(11).map(|m| m.to_string()).collect();
     let more = if missing.len() > 10 { ", ..." } else { "" };
     Some(format!(
         "slices are missing after {}: numbers {}{more}; add them, or rename the slices so that they \
          count without a gap",
-        name(*n),
+        name(n),
         missing[..missing.len().min(10)].join(", ")
     ))
 }
@@ -144,9 +150,28 @@ mod tests {
         assert!(error.to_string().contains("slice_11"), "{error}");
     }
 
+    fn names(names: &[&str]) -> Vec<PathBuf> {
+        names.iter().map(PathBuf::from).collect()
+    }
+
+    #[test]
+    fn two_series_in_a_folder_are_refused() {
+        let two = |a: &str, b: &str| format!("{a} and {b} differ in more than the slice number");
+        for (files, expected) in [
+            (&["a_000.tif", "a_001.tif", "b_000.tif", "b_001.tif"], two("a_000.tif", "b_000.tif")),
+            (&["average.tif", "s1.tif", "s2.tif", "s3.tif"], two("average.tif", "s1.tif")),
+            (&["t1_s1.tif", "t1_s2.tif", "t2_s1.tif", "t2_s2.tif"], two("t1_s1.tif", "t2_s1.tif")),
+            (&["t1_s1.tif", "t1_s2.tif", "t1_s3.tif", "t2_s4.tif"], two("t1_s1.tif", "t2_s4.tif")),
+        ] {
+            let message = gap(&names(files)).unwrap();
+            assert!(message.starts_with(&expected), "{message}");
+        }
+        assert_eq!(gap(&names(&["only.tif"])), None);
+        assert_eq!(gap(&names(&["2024_s08.tif", "2024_s09.tif", "2024_s10.tif"])), None);
+    }
+
     #[test]
     fn a_slice_that_is_missing_is_named() {
-        let names = |names: &[&str]| -> Vec<PathBuf> { names.iter().map(PathBuf::from).collect() };
         let all: Vec<PathBuf> = (0..40).map(|n| format!("s{n}.tif").into()).collect();
         assert_eq!(gap(&all), None);
         let some = |keep: fn(usize) -> bool| -> Vec<PathBuf> {
@@ -158,14 +183,12 @@ mod tests {
         assert!(message.contains("after s16.tif: numbers 17, 30;"), "{message}");
         let message = gap(&some(|n| !(5..=35).contains(&n))).unwrap();
         assert!(message.contains("5, 6, 7, 8, 9, 10, 11, 12, 13, 14, ...;"), "{message}");
-        // Increment of ten, with other constant numbers, and with several varying numbers.
+        // Increment of ten, and with other constant numbers.
         assert_eq!(gap(&some(|n| n % 10 == 0)), None);
         let message = gap(&some(|n| n % 4 == 0 && n != 8)).unwrap();
         assert!(message.contains("after s4.tif: numbers 8;"), "{message}");
         let message = gap(&names(&["2_5um_001.tif", "2_5um_002.tif", "2_5um_004.tif"])).unwrap();
         assert!(message.contains("numbers 3;"), "{message}");
-        assert_eq!(gap(&names(&["a1.tif", "b2.tif", "c7.tif", "d.tif"])), None);
-        assert_eq!(gap(&names(&["t1_s1.tif", "t1_s2.tif", "t2_s4.tif"])), None);
         let message = gap(&names(&["s1.tif", "s01.tif", "s2.tif"])).unwrap();
         assert!(message.contains("the same number"), "{message}");
         // Refused before a slice is read.
