@@ -21,7 +21,8 @@ pub(super) struct Header {
     pub sizes: Vec<u64>,
     /// Kind and width [bytes] of the numbers, as in [`Number`].
     pub number: Option<(u8, usize)>,
-    pub big: bool,
+    /// Whether the first byte of a number is the most significant one, if stated.
+    pub big: Option<bool>,
     pub packed: Packed,
     /// File with the voxels; `None` if they follow the header.
     pub data_file: Option<String>,
@@ -78,13 +79,27 @@ pub(super) fn voxels(
                       numbers";
         return Err(unsupported(reason.into()));
     };
-    let number = Number { big: header.big, kind, width };
+    if header.big.is_none() && width > 1 {
+        return Err(unsupported(format!(
+            "the byte order of its {width}-byte numbers is not stated; add endian: little (NRRD) \
+             or BinaryDataByteOrderMSB = False (MetaImage), or big and True"
+        )));
+    }
+    let number = Number { big: header.big == Some(true), kind, width };
     let apart;
-    let data = match &header.data_file {
+    let data_file = header.data_file.as_deref().map(|name| name.trim_start_matches("./"));
+    let data = match data_file {
         None => own,
-        Some(name) if name.contains(['/', '\\', ' ']) || name == "LIST" || name.contains('%') => {
+        Some(name) if name.contains(['/', '\\']) => {
             return Err(unsupported(format!(
-                "its voxels lie in {name:?}; they must lie in one file in the same folder"
+                "its voxels lie in {name:?}, in another folder; put that file beside the header \
+                 and write its name alone"
+            )));
+        }
+        Some(name) if is_several(name) => {
+            return Err(unsupported(format!(
+                "its voxels lie in several files, {name:?}; join them to one file, or save them \
+                 as a folder of .tif slices"
             )));
         }
         Some(name) => {
@@ -100,7 +115,7 @@ pub(super) fn voxels(
             &apart
         }
     };
-    let needed = voxels * number.width as u64;
+    let needed = voxels * width as u64;
     let raw = header.packed == Packed::Raw;
     let skip = match header.skip {
         -1 if raw => (data.len() as u64).saturating_sub(needed),
@@ -108,18 +123,8 @@ pub(super) fn voxels(
         skip => skip as u64,
     };
     let data = data.get(usize::try_from(skip).unwrap_or(usize::MAX)..).unwrap_or(&[]);
-    // Surplus data indicates slices that would be lost without notice.
-    if let Some(name) = header.data_file.filter(|_| raw && data.len() as u64 > needed) {
-        return Err(unsupported(format!(
-            "the header states {nx} x {ny} x {nz} voxels of {} bytes, {needed} bytes; {name:?} \
-             has {} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
-             (HeaderSize), which is -1 where the voxels end the file",
-            number.width,
-            data.len()
-        )));
-    }
     let mut plain = Vec::new();
-    let data = match header.packed {
+    let unpacked = match header.packed {
         Packed::Raw => data,
         Packed::Gzip => unpack(path, MultiGzDecoder::new(data), needed, &mut plain)?,
         Packed::Zlib => unpack(path, ZlibDecoder::new(data), needed, &mut plain)?,
@@ -128,12 +133,28 @@ pub(super) fn voxels(
             return Err(unsupported(reason.into()));
         }
     };
+    // Surplus data indicates slices that would be lost without notice.
+    if unpacked.len() as u64 > needed {
+        let place = data_file.map_or("the file".to_owned(), |name| format!("{name:?}"));
+        let has = if raw { unpacked.len().to_string() } else { "more".to_owned() };
+        return Err(unsupported(format!(
+            "the header states {nx} x {ny} x {nz} voxels of {width} bytes, {needed} bytes; {place} \
+             has {has} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
+             (HeaderSize), which is -1 where the voxels end the file"
+        )));
+    }
     let dims = [nx, ny, nz].map(|n| n as usize);
-    let mut volume = number.volume(path, dims, false, data)?;
+    let mut volume = number.volume(path, dims, false, unpacked)?;
     if header.geometry.is_some_and(|geometry| geometry.mirrored()) {
         mirror(&mut volume);
     }
     Ok((volume, stated))
+}
+
+/// Returns whether a name stands for several files: `LIST`, or a pattern such as `slice%03d.raw`.
+fn is_several(name: &str) -> bool {
+    let is_place = |rest: &str| rest.trim_start_matches(char::is_numeric).starts_with('d');
+    name.split(' ').next() == Some("LIST") || name.split('%').skip(1).any(is_place)
 }
 
 /// Decompresses `needed` bytes, and one more if there are more.
@@ -197,7 +218,7 @@ mod tests {
         let apart = nrrd("endian: little\nencoding: raw\nbyte skip: 5\ndata file: a.raw\n");
         assert_eq!(read_nrrd(&path, apart.as_bytes(), &limits()).unwrap(), expect);
         let meta = "ObjectType = Image\nNDims = 3\nDimSize = 3 2 1\nElementType = MET_USHORT\n\
-                    HeaderSize = 5\nElementDataFile = a.raw\n";
+                    BinaryDataByteOrderMSB = False\nHeaderSize = 5\nElementDataFile = a.raw\n";
         assert_eq!(read_meta(&path, meta.as_bytes(), &limits()).unwrap(), expect);
         let mut local = meta.replace("HeaderSize = 5\n", "").replace("a.raw", "LOCAL").into_bytes();
         local.extend_from_slice(&little);
@@ -296,5 +317,73 @@ mod tests {
         assert_eq!(meta("-1 0 0 0 1 0 0 0 1"), mirrored);
         assert_eq!(meta("0 1 0 0 0 1 1 0 0"), plain);
         assert_eq!(meta("0 1 0 1 0 0 0 0 1"), mirrored);
+    }
+
+    #[test]
+    fn surplus_voxels_are_refused_in_every_encoding() {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), Default::default());
+        gzip.write_all(&[7; 10]).unwrap();
+        let gzip = gzip.finish().unwrap();
+        let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), Default::default());
+        zlib.write_all(&[7; 10]).unwrap();
+        let zlib = zlib.finish().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("my a.raw.gz"), &gzip).unwrap();
+        let head = "NRRD0004\ntype: uchar\nsizes: 3 2 1\n";
+        let refused = |more: &str, data: &[u8], words: &str| {
+            let bytes = [format!("{head}{more}\n").as_bytes(), data].concat();
+            let read = nrrd::read(&folder.path().join("a.nrrd"), &bytes, &limits());
+            let message = read.unwrap_err().to_string();
+            assert!(message.contains(words), "`{words}` is missing in: {message}");
+        };
+        refused("encoding: raw\n", &[7; 10], "6 bytes; the file has 10 after");
+        refused("encoding: gzip\n", &gzip, "6 bytes; the file has more after");
+        let apart = "encoding: gzip\ndata file: ./my a.raw.gz\n";
+        refused(apart, &[], "6 bytes; \"my a.raw.gz\" has more after");
+        let text = "DimSize = 3 2 1\nElementType = MET_UCHAR\nCompressedData = T\n\
+                    ElementDataFile = LOCAL\n";
+        let bytes = [text.as_bytes(), &zlib].concat();
+        let message = read_meta(Path::new("a.mha"), &bytes, &limits()).unwrap_err().to_string();
+        assert!(message.contains("the file has more"), "{message}");
+    }
+
+    #[test]
+    fn keys_that_change_the_meaning_are_read_or_refused() {
+        for (more, words) in [
+            ("line skip: 2\n", "line skip: 2"),
+            ("encoding: gzip\nbyte skip: 3\n", "byte skip: 3"),
+            ("encoding: ascii\n", "neither raw nor gzipped"),
+            ("endian: middle\n", "endian: \"middle\""),
+            ("type: short\n", "byte order of its 2-byte numbers"),
+            ("data file: slice%03d.raw 1 9 1\n", "several files"),
+            ("data file: LIST\n", "several files"),
+            ("data file: ../a.raw\n", "another folder"),
+            ("data file: no such file.raw\n", "\"no such file.raw\", which is not there"),
+        ] {
+            let message = nrrd_with(more).unwrap_err().to_string();
+            assert!(message.contains(words), "`{words}` is missing in: {message}");
+        }
+        nrrd_with("line skip: 0\n").unwrap();
+        for (more, words) in [
+            ("ElementNumberOfChannels = 3\n", "ElementNumberOfChannels = 3"),
+            ("BinaryData = False\n", "BinaryData = False"),
+            ("CompressedData = maybe\n", "CompressedData = maybe"),
+            ("ElementType = MET_SHORT\n", "byte order of its 2-byte numbers"),
+        ] {
+            let message = meta_with(more).unwrap_err().to_string();
+            assert!(message.contains(words), "`{words}` is missing in: {message}");
+        }
+        meta_with("ElementNumberOfChannels = 1\nBinaryData = True\n").unwrap();
+        let big = |word: &str| {
+            let text = format!(
+                "DimSize = 1 1 1\nElementType = MET_USHORT\nBinaryDataByteOrderMSB = {word}\n\
+                 ElementDataFile = LOCAL\n"
+            );
+            read_meta(Path::new("a.mha"), &[text.as_bytes(), &[1, 0]].concat(), &limits())
+        };
+        for (word, value) in [("True", 256), ("T", 256), ("1", 256), ("False", 1), ("0", 1)] {
+            let voxels = Voxels::Labels(vec![value]);
+            assert_eq!(big(word).unwrap().voxels, voxels, "{word}");
+        }
     }
 }

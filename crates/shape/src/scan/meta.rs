@@ -29,12 +29,26 @@ pub(super) fn read(
             continue;
         };
         let value = value.trim();
-        let yes = value.eq_ignore_ascii_case("true");
-        match key.trim() {
+        let key = key.trim();
+        let refused =
+            |remedy: &str| ShapeError::unsupported(path, format!("{key} = {value} {remedy}"));
+        // Only the first character counts.
+        let flag = || match value.chars().next() {
+            Some('T' | 't' | '1') => Ok(true),
+            Some('F' | 'f' | '0') => Ok(false),
+            _ => Err(refused("is neither True nor False; correct the header")),
+        };
+        match key {
             "DimSize" => header.sizes = sizes(value),
             "ElementType" => header.number = number(value),
-            "BinaryDataByteOrderMSB" | "ElementByteOrderMSB" => header.big = yes,
-            "CompressedData" if yes => header.packed = Packed::Zlib,
+            "BinaryDataByteOrderMSB" | "ElementByteOrderMSB" => header.big = Some(flag()?),
+            "CompressedData" if flag()? => header.packed = Packed::Zlib,
+            "BinaryData" if !flag()? => {
+                return Err(refused("means voxels as text; save them in binary form"));
+            }
+            "ElementNumberOfChannels" if value != "1" => {
+                return Err(refused("is not supported; save one channel alone"));
+            }
             "HeaderSize" => {
                 header.skip =
                     skip(value).ok_or_else(|| malformed("HeaderSize is not 0, 1, ... or -1"))?;

@@ -15,6 +15,7 @@ pub(super) fn read(
     limits: &ReadLimits,
 ) -> Result<(Volume, Option<StatedVoxel>)> {
     let malformed = |reason: &str| ShapeError::malformed(path, reason);
+    let refused = |key: &str, value: &str, what: &str| refused(path, key, value, what);
     if !bytes.starts_with(b"NRRD000") {
         return Err(malformed("it does not begin with the NRRD signature"));
     }
@@ -35,7 +36,13 @@ pub(super) fn read(
         match key.trim().to_ascii_lowercase().as_str() {
             "sizes" => header.sizes = sizes(value),
             "type" => header.number = number(value),
-            "endian" => header.big = value.eq_ignore_ascii_case("big"),
+            "endian" => {
+                header.big = match value.to_ascii_lowercase().as_str() {
+                    "little" => Some(false),
+                    "big" => Some(true),
+                    _ => return Err(refused(key, value, "little or big")),
+                }
+            }
             "encoding" => {
                 header.packed = match value.to_ascii_lowercase().as_str() {
                     "raw" => Packed::Raw,
@@ -48,10 +55,23 @@ pub(super) fn read(
                 header.skip =
                     skip(value).ok_or_else(|| malformed("byte skip is not 0, 1, ... or -1"))?;
             }
+            "line skip" | "lineskip" if value != "0" => {
+                let reason = format!(
+                    "line skip: {value} is not supported; remove these lines from the data"
+                );
+                return Err(ShapeError::unsupported(path, reason));
+            }
             key => {
                 space.insert(key.to_owned(), value.to_owned());
             }
         }
+    }
+    if header.packed == Packed::Gzip && header.skip != 0 {
+        let reason = format!(
+            "byte skip: {} is not supported for gzipped voxels; save them without other data",
+            header.skip
+        );
+        return Err(ShapeError::unsupported(path, reason));
     }
     if end.is_none() && header.data_file.is_none() {
         return Err(malformed("the NRRD header does not end"));
@@ -63,23 +83,25 @@ pub(super) fn read(
     voxels(path, header, &bytes[start..], limits)
 }
 
+fn refused(path: &Path, key: &str, value: &str, what: &str) -> ShapeError {
+    ShapeError::unsupported(path, format!("{key}: {value:?} is not {what}; correct the header"))
+}
+
 /// Returns the voxel size and the axes from the fields of the header.
 fn geometry(path: &Path, fields: &HashMap<String, String>) -> Result<Option<Geometry>> {
     let field = |key: &str| fields.get(key).map(String::as_str).unwrap_or_default();
-    let three = |key: &str, value: &str, what: &str| {
-        ShapeError::unsupported(path, format!("{key}: {value:?} is not {what}; correct the header"))
-    };
+    let refused = |key: &str, value: &str, what: &str| refused(path, key, value, what);
     let unit = |key: &'static str| {
         // Each unit is in quotation marks.
         let mut units = field(key).split('"').skip(1).step_by(2);
         let first = units.next().unwrap_or_default().to_owned();
         let all = units.all(|unit| unit == first);
-        all.then_some(first).ok_or_else(|| three(key, field(key), "one unit for all axes"))
+        all.then_some(first).ok_or_else(|| refused(key, field(key), "one unit for all axes"))
     };
     if let Some(value) = fields.get("space directions") {
         let key = "space directions";
         let Some([a, b, c, d, e, f, g, h, i]) = numbers(value) else {
-            return Err(three(key, value, "three vectors of three numbers"));
+            return Err(refused(key, value, "three vectors of three numbers"));
         };
         let steps = [DVec3::new(a, b, c), DVec3::new(d, e, f), DVec3::new(g, h, i)];
         let space = field("space").to_ascii_lowercase();
@@ -92,7 +114,7 @@ fn geometry(path: &Path, fields: &HashMap<String, String>) -> Result<Option<Geom
         return Ok(None);
     };
     let Some(edges) = numbers(value) else {
-        return Err(three("spacings", value, "three numbers"));
+        return Err(refused("spacings", value, "three numbers"));
     };
     // An unknown spacing is written as NaN.
     let known = edges.iter().any(|edge: &f64| !edge.is_nan());
