@@ -148,7 +148,7 @@ pub fn shape_help(error: &ShapeError) -> Option<String> {
         }
         ShapeError::CutByBorder { label, faces } if faces.split(", ").count() == 6 => {
             return Some(format!(
-                "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --pad includes it, truncated at the border"
+                "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --pad includes it, truncated at the border; if the grains are darker than the void, invert the grey values first (ImageJ: Edit > Invert; NumPy: image.max() - image)"
             ));
         }
         ShapeError::CutByBorder { .. } | ShapeError::CutByView { .. } => {

@@ -347,8 +347,11 @@ fn grains_of_an_earlier_run_do_not_stay() {
     // Other numbers than before: the old ones belong to no table.
     let message = run(&["--split"], 2);
     assert!(message.contains("label-00007.grain exists already"), "{message}");
-    // What gives no grain removes none.
+    // Commands without a grain, or with a bad option, remove none.
     run(&["--threshold", "200", "--force"], 2);
+    for diameter in ["2 parsec", "1e9 m"] {
+        run(&["--split", "--force", "--equivalent-diameter", diameter], 2);
+    }
     assert_eq!(grains().len(), 5);
     run(&["--split", "--force"], 0);
     assert_eq!(
@@ -423,6 +426,12 @@ fn a_whole_phase_taken_for_a_grain() {
     for word in ["label 1 is a whole phase", "--split", "--separate", "--pad"] {
         assert!(message.contains(word), "`{word}` is missing in:\n{message}");
     }
+    // Dark grains in bright surroundings.
+    let dark = nrrd("uint8", [24; 3], &image(|r| if r < 8.0 { 50 } else { 200 }));
+    for more in [&[][..], &["--split"]] {
+        let message = all_grains(&dark, &[&["--threshold", "otsu"], more].concat(), 2);
+        assert!(message.contains("darker than the void, invert the grey values"), "{message}");
+    }
     let two = image(|r| u8::from(r < 3.0 || (6.0..10.0).contains(&r)));
     let message = all_grains(&nrrd("uint8", [24; 3], &two), &[], 2);
     assert!(
@@ -442,6 +451,27 @@ fn an_image_with_a_value_that_is_no_number() {
         &file,
         &["nan.nrrd", "x 5, y 4, z 3 is NaN, not a finite number", "value of the void"],
     );
+}
+
+#[test]
+fn a_median_without_a_threshold() {
+    let message = all_grains(&nrrd("uint8", [24; 3], &image(BALL)), &["--median"], 2);
+    assert!(message.contains("--median") && message.contains("--threshold otsu"), "{message}");
+}
+
+#[test]
+fn a_closed_form_without_a_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |more: &[&str], code: i32| {
+        let out = folder.path().join("ball.grain");
+        let mut program = grainwake();
+        program.args(["grain", "make", "sphere", "2", "--cells", "32"]).args(more);
+        let done = program.arg("-o").arg(out).assert().code(code);
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let message = make(&[], 2);
+    assert!(message.contains("1 um to 1 m") && message.contains("unit of the sizes"), "{message}");
+    make(&["--equivalent-diameter", "2 mm"], 0);
 }
 
 #[test]

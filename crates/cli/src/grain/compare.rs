@@ -5,7 +5,7 @@ use grainwake_shape::render::Picture;
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
 
-use super::not_input;
+use super::may_draw;
 use crate::args::CompareArgs;
 use crate::exit::Exit;
 use crate::print;
@@ -13,8 +13,7 @@ use crate::print;
 /// Prints the morphology of two grains and the distance of their surfaces.
 pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
     if let Some(picture) = &args.picture {
-        not_input(picture, &args.first)?;
-        not_input(picture, &args.second)?;
+        may_draw("--picture", picture, &[&args.first, &args.second])?;
     }
     let first = Shape::load(&args.first)?;
     let mut second = Shape::load(&args.second)?;

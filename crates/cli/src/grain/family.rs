@@ -4,7 +4,7 @@ use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::render::Picture;
 use grainwake_shape::{ShapeError, write_table};
 
-use super::{folder, length, may_write, show};
+use super::{create, folder, length, may_write, show};
 use crate::args::FamilyArgs;
 use crate::exit::{BAD_INPUT, Exit};
 
@@ -40,7 +40,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
             shapes.push(shape.map_err(|error| refused(error, sphericity))?);
         }
     }
-    std::fs::create_dir_all(&args.output)?;
+    create(&args.output)?;
     let (mut rows, mut pictures) = (Vec::new(), Vec::new());
     for (n, shape) in shapes.iter().enumerate() {
         let path = file(n + 1);

@@ -2,7 +2,7 @@
 
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
-use super::{grain_file, length, may_write, options, save};
+use super::{diameter, grain_file, length, may_write, options, save, sized};
 use crate::args::Body;
 use crate::exit::Exit;
 
@@ -18,7 +18,8 @@ pub fn make(body: &Body) -> Result<(), Exit> {
     };
     grain_file(&new.output)?;
     may_write(&new.output, new.common.force)?;
-    save(build(body, &options(new))?, new)
+    let diameter = diameter(new)?;
+    save(&sized(build(body, &options(new))?, diameter, "the sizes")?, new)
 }
 
 fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {

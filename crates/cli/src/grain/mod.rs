@@ -10,7 +10,8 @@ mod refused;
 mod scan;
 mod table;
 
-use std::path::Path;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use grainwake_run::case::parse_length;
 use grainwake_run::number_format;
@@ -18,7 +19,7 @@ use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 
 use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::print;
 
 /// Runs one of the commands.
@@ -47,12 +48,22 @@ fn length(name: &str, text: &str) -> Result<f64, Exit> {
 }
 
 /// Accepted equivalent diameters [m]; others indicate a wrong unit.
-const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
+const GRAINS: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
+
+/// Rescales a shape to the diameter of `--equivalent-diameter`. Without it refuses an implausible
+/// size, which indicates a wrong unit of `option`.
+fn sized(shape: Shape, diameter: Option<f64>, option: &str) -> Result<Shape, Exit> {
+    if let Some(diameter) = diameter {
+        return Ok(shape.scaled_to_equivalent_diameter(diameter)?);
+    }
+    plausible(&shape, option)?;
+    Ok(shape)
+}
 
 /// Refuses a grain of implausible size, which indicates a wrong unit of `option`.
-fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
+fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
     let diameter = shape.equivalent_diameter();
-    if GRAINS.contains(&diameter) || new.equivalent_diameter.is_some() {
+    if GRAINS.contains(&diameter) {
         return Ok(());
     }
     Err(Exit::with_help(
@@ -67,6 +78,11 @@ fn plausible(shape: &Shape, new: &NewGrain, option: &str) -> Result<(), Exit> {
     ))
 }
 
+/// Parses `--equivalent-diameter` [m].
+fn diameter(new: &NewGrain) -> Result<Option<f64>, Exit> {
+    new.equivalent_diameter.as_ref().map(|text| length("--equivalent-diameter", text)).transpose()
+}
+
 fn options(new: &NewGrain) -> ShapeOptions {
     let mut options = ShapeOptions { nodes: new.common.nodes, ..ShapeOptions::default() };
     if let Some(cells) = new.common.cells {
@@ -75,9 +91,13 @@ fn options(new: &NewGrain) -> ShapeOptions {
     options
 }
 
-/// Refuses to replace a file without `--force`; called before the work starts.
+/// Refuses to replace a file without `--force`, and a file that cannot be created. Called before
+/// the work starts.
 fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
-    if path.exists() && !force {
+    if !path.exists() {
+        return may_create(folder_of(path));
+    }
+    if !force {
         return Err(Exit::with_help(
             BAD_INPUT,
             format!("{} exists already", path.display()),
@@ -103,6 +123,50 @@ fn not_input(output: &Path, input: &Path) -> Result<(), Exit> {
     Ok(())
 }
 
+/// Refuses a picture that is an input of the command, does not end in .png, or would replace a file
+/// that is not a PNG.
+fn may_draw(option: &str, picture: &Path, inputs: &[&Path]) -> Result<(), Exit> {
+    inputs.iter().try_for_each(|input| not_input(picture, input))?;
+    if picture.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+        let message = format!("{option}: {} does not end in .png", picture.display());
+        return Err(Exit::with_help(BAD_INPUT, message, "name a picture, such as picture.png"));
+    }
+    let mut start = [0; 8];
+    let read = std::fs::File::open(picture).and_then(|mut file| file.read_exact(&mut start));
+    if picture.exists() && (read.is_err() || start != *b"\x89PNG\r\n\x1a\n") {
+        let message = format!("{option}: {} exists and is not a picture", picture.display());
+        return Err(Exit::with_help(BAD_INPUT, message, "choose another name"));
+    }
+    Ok(())
+}
+
+/// Refuses a folder that cannot be created or written.
+fn may_create(folder: &Path) -> Result<(), Exit> {
+    let above = folder.ancestors().find(|f| f.exists()).unwrap_or(Path::new("."));
+    let help = "choose another place with -o";
+    if !above.is_dir() {
+        let message = format!("{} is a file, not a folder", above.display());
+        return Err(Exit::with_help(BAD_INPUT, message, help));
+    }
+    let probe = above.join(format!(".grainwake-{}", std::process::id()));
+    std::fs::create_dir(&probe).and_then(|()| std::fs::remove_dir(&probe)).map_err(|error| {
+        let message = format!("cannot write to {}: {error}", above.display());
+        Exit::with_help(IO, message, help)
+    })
+}
+
+/// Returns the folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
+}
+
+/// Creates a folder and those above it.
+fn create(folder: &Path) -> Result<(), Exit> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Exit::new(IO, format!("cannot create the folder {}: {error}", folder.display()))
+    })
+}
+
 /// Refuses a file name without the extension `.grain`.
 fn grain_file(path: &Path) -> Result<(), Exit> {
     if path.extension().is_some_and(|e| e == "grain") {
@@ -119,12 +183,13 @@ fn grain_file(path: &Path) -> Result<(), Exit> {
 /// ones, begin with "gr".
 const FILES: [&str; 10] = ["stl", "ply", "obj", "tif", "tiff", "npy", "npz", "nrrd", "mha", "png"];
 
-/// Refuses a new folder with the extension of a file, which indicates a mistake.
+/// Refuses a new folder with the extension of a file, which indicates a mistake, and a folder that
+/// cannot be written.
 fn folder(path: &Path) -> Result<(), Exit> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let file = ending.is_some_and(|e| e.starts_with("gr") || FILES.contains(&e.as_str()));
     if !file || path.is_dir() {
-        return Ok(());
+        return may_create(path);
     }
     Err(Exit::with_help(
         BAD_INPUT,
@@ -133,25 +198,11 @@ fn folder(path: &Path) -> Result<(), Exit> {
     ))
 }
 
-/// Rescales on request and saves.
-fn finish(shape: Shape, path: &Path, new: &NewGrain) -> Result<Shape, Exit> {
-    let shape = match &new.equivalent_diameter {
-        Some(text) => {
-            shape.scaled_to_equivalent_diameter(length("--equivalent-diameter", text)?)?
-        }
-        None => shape,
-    };
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder)?;
-    }
-    shape.save(path)?;
-    Ok(shape)
-}
-
 /// Saves and prints one shape.
-fn save(shape: Shape, new: &NewGrain) -> Result<(), Exit> {
-    let shape = finish(shape, &new.output, new)?;
-    show(&shape, &new.output, new.common.json)
+fn save(shape: &Shape, new: &NewGrain) -> Result<(), Exit> {
+    create(folder_of(&new.output))?;
+    shape.save(&new.output)?;
+    show(shape, &new.output, new.common.json)
 }
 
 fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
@@ -164,7 +215,8 @@ fn show(shape: &Shape, path: &Path, json: bool) -> Result<(), Exit> {
 
 fn info(args: &InfoArgs) -> Result<(), Exit> {
     if let Some(picture) = &args.picture {
-        args.files.iter().try_for_each(|f| not_input(picture, f))?;
+        let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
+        may_draw("--picture", picture, &inputs)?;
     }
     let mut pictures = Vec::new();
     for path in &args.files {

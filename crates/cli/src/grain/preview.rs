@@ -11,7 +11,6 @@ use grainwake_plot::{literal, text};
 use grainwake_shape::scan::{Scan, Volume, Voxels};
 
 use super::refused::{line, trial};
-use super::{may_write, not_input};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::progress::count;
@@ -35,16 +34,6 @@ const LINE: f64 = 10.5;
 const HATCH: usize = 14;
 /// Minimum size of a region with a number [pt].
 const NUMBERED: f64 = 11.0;
-
-/// Refuses a picture that cannot be written.
-pub fn may_draw(picture: &Path, args: &FromScanArgs) -> Result<(), Exit> {
-    if picture.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        let message = format!("--preview: {} does not end in .png", picture.display());
-        return Err(Exit::with_help(BAD_INPUT, message, "name a picture, such as preview.png"));
-    }
-    not_input(picture, &args.image)?;
-    may_write(picture, args.new.common.force)
-}
 
 /// A slice of the volume: its axes to the right and down, and its position along the third.
 struct Slice {

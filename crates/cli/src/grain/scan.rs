@@ -13,7 +13,10 @@ use serde_json::json;
 
 use super::preview;
 use super::refused::{advice, lines, named};
-use super::{finish, folder, length, may_write, not_input, options, plausible, save};
+use super::{
+    create, diameter, folder, length, may_draw, may_write, not_input, options, plausible, save,
+    sized,
+};
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
 use crate::progress::count;
@@ -32,9 +35,10 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     } else {
         folder(output)?;
     }
-    let mut how = how(args)?;
+    let (mut how, diameter) = (how(args)?, diameter(&args.new)?);
     if let Some(picture) = &args.preview {
-        preview::may_draw(picture, args)?;
+        may_draw("--preview", picture, &[&args.image])?;
+        may_write(picture, args.new.common.force)?;
         // Acceptance does not depend on it.
         how.shape.roundness = false;
     }
@@ -79,7 +83,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     }
     drop(volume);
     if !one_file {
-        return all(args, scan);
+        return all(args, scan, diameter);
     }
     let grain = match <[ScannedGrain; 1]>::try_from(scan.grains) {
         Ok([grain]) => grain,
@@ -100,12 +104,17 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
             ));
         }
     };
-    let shape = grain.shape?;
-    plausible(&shape, &args.new, "--voxel")?;
-    save(shape, &args.new)
+    save(&sized(grain.shape?, diameter, "--voxel")?, &args.new)
 }
 
 fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
+    if args.median && args.threshold.is_none() {
+        return Err(Exit::with_help(
+            BAD_INPUT,
+            "--median filters grey values before the threshold, and there is no --threshold",
+            "add --threshold otsu or a grey value, or omit --median for an image of labels",
+        ));
+    }
     let mut how = ScanOptions::new(length("--voxel", &args.voxel)?);
     how.label = args.label;
     how.labels = args.labels;
@@ -180,22 +189,29 @@ fn earlier(folder: &Path) -> Vec<PathBuf> {
 
 /// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
 /// labels with the reason.
-fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
-    let Scan { grains, labels, refusals, .. } = scan;
+fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exit> {
+    let Scan { mut grains, labels, refusals, .. } = scan;
     let place = &args.new.output;
     let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
     let (table, sheet, image) =
         (place.join("table.csv"), place.join("sheet.png"), place.join("labels.tif"));
-    let usable = || grains.iter().filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)));
     let earlier = earlier(place);
     for file in &earlier {
         may_write(file, args.new.common.force)?;
     }
+    if let Some(diameter) = diameter {
+        for grain in &mut grains {
+            if let Ok(shape) = &mut grain.shape {
+                *shape = shape.scaled_to_equivalent_diameter(diameter)?;
+            }
+        }
+    }
+    let usable = || grains.iter().filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)));
     // Only the largest grain is checked, because fragments may be small.
     let size = |shape: &Shape| shape.equivalent_diameter();
     let largest = usable().max_by(|a, b| size(a.1).total_cmp(&size(b.1)));
-    if let Some((_, shape)) = largest {
-        plausible(shape, &args.new, "--voxel")?;
+    if let Some((_, shape)) = largest.filter(|_| diameter.is_none()) {
+        plausible(shape, "--voxel")?;
     }
     for file in [&table, &sheet, &image] {
         not_input(file, &args.image)?;
@@ -205,6 +221,9 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
     for file in earlier.iter().filter(|_| largest.is_some()) {
         let failed = |e| Exit::new(IO, format!("cannot remove {}: {e}", file.display()));
         std::fs::remove_file(file).map_err(failed)?;
+    }
+    if largest.is_some() {
+        create(place)?;
     }
     let advice = advice(&grains);
     let treated = treated(&grains);
@@ -217,7 +236,7 @@ fn all(args: &FromScanArgs, scan: Scan) -> Result<(), Exit> {
             let ScannedGrain { label, voxels, shared_surface, shape, rescued } = grain;
             let written = shape.ok().map(|shape| {
                 let file = path(label);
-                let shape = finish(shape, &file, &args.new)?;
+                shape.save(&file)?;
                 let picture = drawn.binary_search(&label).is_ok().then(|| {
                     let width = 2.1 * shape.bounding_radius();
                     Picture::of(&shape, View::BROAD, SHEET.0, width, false)
