@@ -12,14 +12,15 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
+    let text = text(&bytes);
     let binary = bytes.len() >= HEADER && {
         let count = u32::from_le_bytes([bytes[80], bytes[81], bytes[82], bytes[83]]);
         let needed = HEADER as u64 + TRIANGLE as u64 * u64::from(count);
         let size = bytes.len() as u64;
-        if needed != size && !bytes.starts_with(b"solid") {
+        if needed != size && text.is_none() {
             let reason = format!(
                 "the header counts {count} triangles, which take {needed} bytes, but the file has \
-                 {size}"
+                 {size}; a text file begins with the word solid"
             );
             return Err(ShapeError::malformed(path, reason));
         }
@@ -28,7 +29,9 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
     if binary {
         // Binary files often begin with the keyword that identifies text files.
         bytes[0] = b' ';
-    } else if !bytes.starts_with(b"solid") {
+    } else if let Some(text) = text {
+        bytes = text;
+    } else {
         return Err(ShapeError::malformed(path, "too short for an STL file"));
     }
     let mut cursor = Cursor::new(bytes);
@@ -46,4 +49,40 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh)
+}
+
+/// Returns a text file in the form that `stl_io` reads: lower case, and no byte-order mark, blanks
+/// or name before the facets. `None` for other files.
+fn text(bytes: &[u8]) -> Option<Vec<u8>> {
+    let body = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let name = body.get(5..).filter(|_| body[..5].eq_ignore_ascii_case(b"solid"))?;
+    let facets = name.iter().position(|b| *b == b'\n').unwrap_or(name.len());
+    Some([b"solid ", &name[facets..].to_ascii_lowercase()[..]].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_files_of_all_writers() {
+        let text = "solid a b\n  facet normal 0 0 1\n    outer loop\n      vertex 0 0 0\n      \
+                    vertex 1E0 0 0\n      vertex 0 1.5e0 0\n    endloop\n  endfacet\nendsolid a\n";
+        let read = |bytes: &[u8]| read(Path::new("a.stl"), bytes.to_vec(), &ReadLimits::default());
+        let expected = read(text.as_bytes()).unwrap();
+        assert_eq!(expected.vertices[2], DVec3::new(0.0, 1.5, 0.0));
+        for variant in [
+            format!(" \t{text}"),
+            format!("\n{text}"),
+            format!("\u{feff}{text}"),
+            text.to_ascii_uppercase(),
+            text.replace("solid a b", "solid"),
+            text.replace('\n', "\r\n"),
+        ] {
+            let mesh = read(variant.as_bytes()).unwrap();
+            assert_eq!(mesh.vertices, expected.vertices, "{variant}");
+        }
+        let message = read(&[b'x'; 200]).unwrap_err().to_string();
+        assert!(message.contains("a text file begins with the word solid"), "{message}");
+    }
 }
