@@ -57,7 +57,7 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
             } @else {
                 b { "Shortest " (what) } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."
-                @if censored > 0 { " " (censored) " pairs landed before (right-censored)." }
+                @if censored > 0 { " " (censored) " pairs landed, or their run ended, before (right-censored)." }
             }
         }
     }

@@ -152,7 +152,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     let censored = layout.censored();
     if censored > 0 {
         entries.push(Entry {
-            name: "hollow: landed before kissing; the landing is shown".into(),
+            name: "hollow: landed, or run ended, before kissing".into(),
             colour: INK,
             line: None,
             symbol: Some((Marker::Circle, Fill::Hollow)),
@@ -198,7 +198,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
         ),
     };
     if censored > 0 {
-        caption += &format!(" {censored} pairs landed before they kissed.");
+        caption += &format!(" {censored} pairs landed, or their run ended, before they kissed.");
     }
     let title = "Kissing time of all models";
     Some(Figure::new("fig14a-kissing-time", title, caption, drawing).numbered("14a"))
@@ -252,8 +252,8 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     let censored = layout.censored();
     if censored > 0 {
         caption += &format!(
-            " The {censored} pairs that landed before they kissed are included with the time of \
-             landing."
+            " The {censored} pairs without a kiss are included with the time of their landing or \
+             of the end of the run."
         );
     }
     let title = "Spread of the kissing time by grain";

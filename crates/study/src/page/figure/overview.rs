@@ -42,8 +42,8 @@ pub fn figures(data: &FigureData) -> Vec<Figure> {
             name: "kissing-time",
             title: "Kissing time",
             up: "kissing time  *t* √(*g*/*d*)  [–]",
-            caption: "First contact against the varied parameters. Hollow symbols: the pair \
-                      landed before kissing; the landing is shown."
+            caption: "First contact against the varied parameters. Hollow symbols: no \
+                      contact before the landing or the end of the run, whose time is shown."
                 .into(),
         };
         out.extend(against_parameters(data, "kiss_time", texts));

@@ -133,13 +133,16 @@ fn parameters(data: &FigureData) -> Vec<Parameter> {
     out
 }
 
-/// Draws a quantity against every varied parameter; none if no run has a value.
+/// Draws a quantity against every varied parameter; none if no run has more than a lower bound.
 pub(super) fn against_parameters(
     data: &FigureData,
     quantity: &str,
     texts: Texts,
 ) -> Option<Figure> {
     let all = observations(data.records, quantity, &BTreeMap::new());
+    if all.iter().all(|o| o.censored) {
+        return None;
+    }
     let (low, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, 0.0]))?;
     let mut parameters = parameters(data);
     let left_out = parameters.len().saturating_sub(PANELS);
