@@ -272,7 +272,11 @@ impl Builder<'_> {
                     bounds.relative = Some(percent / 100.0);
                 }
             }
-            if bounds.absolute.or(bounds.relative).is_some_and(|bound| !(bound >= 0.0)) {
+            if bounds
+                .absolute
+                .or(bounds.relative)
+                .is_some_and(|bound| bound.is_nan() || bound < 0.0)
+            {
                 let message = "no value lies within a negative tolerance";
                 let help = "write the tolerance without a sign";
                 return Err(problem::at(self.source, tolerance, message, help, "here"));
