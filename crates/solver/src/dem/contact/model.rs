@@ -249,19 +249,25 @@ pub(in crate::dem) struct PairKinematics {
 }
 
 /// Response of a body to an impulse.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct Mobility {
     /// Inverse mass, with added mass [1/kg].
     pub inverse_mass: f64,
-    /// Inverse inertia about the centroid, space frame [1/(kg m^2)].
-    pub inverse_inertia: DMat3,
+    /// Rotation from the body frame to the space frame.
+    pub rotation: DMat3,
+    /// Principal moments of inertia [kg m^2]; infinite where the rotation is prescribed.
+    pub moments: DVec3,
 }
 
 impl Mobility {
+    /// Mobility of a wall.
+    pub const NONE: Mobility =
+        Mobility { inverse_mass: 0.0, rotation: DMat3::IDENTITY, moments: DVec3::INFINITY };
+
     /// Velocity along `direction` per impulse along it, at a point with this lever arm [1/kg].
     fn along(&self, lever_arm: DVec3, direction: DVec3) -> f64 {
-        let torque = lever_arm.cross(direction);
-        self.inverse_mass + torque.dot(self.inverse_inertia * torque)
+        let torque = self.rotation.transpose() * lever_arm.cross(direction);
+        self.inverse_mass + torque.dot(torque / self.moments)
     }
 }
 
@@ -270,6 +276,9 @@ impl PairKinematics {
     /// point: within a sub-step of `step` [s], an explicit dashpot must not reverse the velocity of
     /// the point, which follows a force at the edge of a flat grain more easily than the centroid.
     fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3, step: f64) -> f64 {
+        if damping == 0.0 {
+            return 0.0;
+        }
         let [a, b] = &self.mobility;
         let mobility = a.along(lever_arm, direction) + b.along(lever_arm + self.branch, direction);
         if step * mobility * damping > 0.5 { 0.5 / (step * mobility) } else { damping }

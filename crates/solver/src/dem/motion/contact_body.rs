@@ -142,16 +142,13 @@ impl ContactBody {
         }
     }
 
-    /// Response to an impulse; zero where the motion is prescribed.
+    /// Response to an impulse.
     fn mobility(&self, grain: &Grain) -> Mobility {
-        let inverse_inertia = match grain.rotation {
-            MotionConstraint::Free => {
-                let moments = DMat3::from_diagonal(grain.principal_inertia().recip());
-                self.rotation * moments * self.rotation.transpose()
-            }
-            MotionConstraint::Prescribed(_) => DMat3::ZERO,
+        let moments = match grain.rotation {
+            MotionConstraint::Free => grain.principal_inertia(),
+            MotionConstraint::Prescribed(_) => DVec3::INFINITY,
         };
-        Mobility { inverse_mass: self.inverse_mass, inverse_inertia }
+        Mobility { inverse_mass: self.inverse_mass, rotation: self.rotation, moments }
     }
 
     fn posed_shape(&self, position: DVec3) -> PosedShape<'_> {
@@ -201,7 +198,7 @@ pub(super) fn evaluate_pair(record: &mut ContactRecord, context: &PairContext) {
         branch: DVec3::ZERO,
         mid_step: [bodies[i].mid_step, RigidVelocity::default()],
         end_of_step: [bodies[i].end_of_step, RigidVelocity::default()],
-        mobility: [bodies[i].mobility(&grains[i]), Mobility::default()],
+        mobility: [bodies[i].mobility(&grains[i]), Mobility::NONE],
     };
     let params = &context.model.params;
     let (friction, closest) = match record.key.partner {
