@@ -163,7 +163,7 @@ impl PyStudy {
         display.call_method0("close")?;
         let (outcomes, raised) = ended?;
         let outcomes = outcomes.raise()?;
-        py.detach(|| write_tables(&records(plan, &folder), &folder)).raise()?;
+        py.detach(|| write_tables(&records(plan, &folder)?, &folder)).raise()?;
         match raised {
             Some(error) => Err(error),
             None => failures(plan, &outcomes),
@@ -234,7 +234,7 @@ pub fn _read_plan(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>>
 #[pyfunction]
 pub fn _read_records(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let rows = py
-        .detach(|| Plan::read_or_rebuild(&folder).map(|(plan, _)| records(&plan, &folder)))
+        .detach(|| Plan::read_or_rebuild(&folder).and_then(|(plan, _)| records(&plan, &folder)))
         .raise()?;
     json(py, &rows)
 }
