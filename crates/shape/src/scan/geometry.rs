@@ -63,7 +63,7 @@ pub(super) struct Geometry {
     pub steps: [DVec3; 3],
     /// Unit as written in the file; empty if there is none.
     pub unit: String,
-    /// Whether the coordinate system of the vectors is left-handed.
+    /// Whether the vectors refer to a left-handed coordinate system.
     pub left_handed: bool,
 }
 

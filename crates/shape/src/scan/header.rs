@@ -21,7 +21,7 @@ pub(super) struct Header {
     pub sizes: Vec<u64>,
     /// Kind and width [bytes] of the numbers, as in [`Number`].
     pub number: Option<(u8, usize)>,
-    /// Whether the first byte of a number is the most significant one, if stated.
+    /// Byte order of the numbers, if stated; true for big-endian.
     pub big: Option<bool>,
     pub packed: Packed,
     /// File with the voxels; `None` if they follow the header.

@@ -1,6 +1,6 @@
-//! Precedence of formulas. The library that evaluates them lets a sign bind tighter than a power
-//! and powers group to the left; here they are written with brackets, as mathematics reads them:
-//! -x^2 is -(x^2), 2^3^2 is 2^(3^2). Numbers with an exponent are written out.
+//! Precedence of signs and powers in formulas. `exmex`, which evaluates the formulas, reads -x^2 as
+//! (-x)^2 and 2^3^2 as (2^3)^2. This module adds brackets for the usual meaning, -(x^2) and 2^(3^2),
+//! and writes numbers without an exponent, because `exmex` does not read 1e-3.
 
 use std::iter::Peekable;
 use std::str::Chars;

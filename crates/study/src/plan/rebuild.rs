@@ -31,7 +31,8 @@ impl Plan {
     /// the run folders and `table.json`, and a note says what is missing from it.
     ///
     /// # Errors
-    /// Those of [`Plan::read`], a damaged plan only if there is no run either; a damaged table.
+    /// If `study.json` is missing, if it is damaged and no run is found, or if `table.json` is
+    /// damaged.
     pub fn read_or_rebuild(folder: &Path) -> Result<(Plan, Option<String>), StudyError> {
         let damage = match Plan::read(folder) {
             Ok(plan) => return Ok((plan, None)),
