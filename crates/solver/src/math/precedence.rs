@@ -1,6 +1,6 @@
 //! Precedence of signs and powers in formulas. `exmex`, which evaluates the formulas, reads -x^2 as
-//! (-x)^2 and 2^3^2 as (2^3)^2. This module adds brackets for the usual meaning, -(x^2) and 2^(3^2),
-//! and writes numbers without an exponent, because `exmex` does not read 1e-3.
+//! (-x)^2 and 2^3^2 as (2^3)^2. This module adds brackets for the usual meaning, -(x^2) and
+//! 2^(3^2), and writes numbers without an exponent, because `exmex` does not read 1e-3.
 
 use std::iter::Peekable;
 use std::str::Chars;
