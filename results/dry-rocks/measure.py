@@ -2,9 +2,11 @@
 
     python3 results/dry-rocks/measure.py target/release/grainwake
 
-Runs: "rest", a rock with damping and friction; "energy", the same rock without them; "heap".
-Value: rms speed in the last sixth (rest) and tenth (heap) of the run [m/s], or the largest relative
-change of the energy between two bounces in 0.2 s (energy). The heap also has its processor time [s].
+Runs: "rest", a rock with damping and friction; "energy", the same rock without them; "heap"; "roll",
+an ellipsoid on a slope.
+Value: rms speed in the last sixth (rest) and tenth (heap) of the run [m/s], the largest relative
+change of the energy between two bounces in 0.2 s (energy), or the relative error of the speed of
+rolling after 0.3 s (roll; number: slope in degrees). The heap also has its processor time [s].
 """
 
 import csv
@@ -77,6 +79,14 @@ def heap(program, folder, seed):
     return rms([v for v, late in zip(speed, last) if late]), summary["cpu_s"]
 
 
+def roll(program, folder, degrees):
+    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    slope = f"gravity = [{GRAVITY * sine}, 0, {-GRAVITY * cosine}]"
+    grains = table(run(program, "rolling.toml", folder, [slope]), "grains.csv")
+    # Moment of inertia about the long axis 2/5 m r^2, as of a sphere.
+    return grains["vx"][-1] / (5 / 7 * GRAVITY * sine * 0.3) - 1
+
+
 def main(program):
     version = subprocess.run([program, "--version"], check=True, capture_output=True, text=True)
     print(f"# {version.stdout.strip()}")
@@ -89,6 +99,8 @@ def main(program):
         for seed in (1, 2):
             value, cpu = heap(program, folder, seed)
             print(f"heap,{seed},{value:.2e},{cpu:.1f}", flush=True)
+        for degrees in (0.5, 1, 2, 3, 6, 10):
+            print(f"roll,{degrees},{roll(program, folder, degrees):.3f},", flush=True)
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ const NUMBERS_PER_CELL: f64 = 13.75;
 /// Bytes of the forced faces of a grain over the square of its diameter in cells, from
 /// `grainwake bench --grains 300`.
 const BYTES_PER_SURFACE_CELL: f64 = 1200.0;
-/// Bytes of a surface node with its place in the contact search.
-const BYTES_PER_NODE: f64 = 100.0;
+/// Bytes of a surface node with its patches and their place in the contact search.
+const BYTES_PER_NODE: f64 = 400.0;
 
 /// Returns the memory of a run: fields, forced faces of the grains, and shapes [bytes].
 pub(crate) fn needed(setup: &Setup) -> u64 {
@@ -33,9 +33,8 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
     let mut seen = BTreeSet::new();
     for grain in &setup.grains {
         let shape = &grain.shape;
-        bytes += shape.nodes().len() as f64 * BYTES_PER_NODE;
         if seen.insert(Arc::as_ptr(shape).addr()) {
-            bytes += shape.bytes() as f64;
+            bytes += shape.bytes() as f64 + shape.nodes().len() as f64 * BYTES_PER_NODE;
         }
     }
     bytes as u64

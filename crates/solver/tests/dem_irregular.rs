@@ -156,21 +156,17 @@ fn stiffness_of_an_irregular_pair_does_not_depend_on_its_nodes() {
         dynamics.advance(&mut grains, &[], 1e-6, &mut mean);
         mean[0].force
     };
+    // The effective overlap of a patch of many points is at most the deepest, so the force is a
+    // little below k delta. It varies with the places of the points that happen to touch.
     for depth in [2e-4, 1e-3] {
         let reference = force(4000, depth);
-        for nodes in [300, 1000, 2000] {
+        for nodes in [1000, 2000] {
             let f = force(nodes, depth);
-            println!(
-                "{nodes} nodes, {depth}: {:.4} of k delta, {:.2e} off",
-                f.length() / (1e4 * depth),
-                (f - reference).length() / reference.length()
-            );
-            assert!(
-                (f.length() / (1e4 * depth) - 1.0).abs() < 0.03,
-                "{nodes} {depth}: {}",
-                f.length()
-            );
-            assert!((f - reference).length() < 0.1 * reference.length(), "{nodes} {depth}");
+            let of_spring = f.length() / (1e4 * depth);
+            let off = (f - reference).length() / reference.length();
+            println!("{nodes} nodes, {depth}: {of_spring:.4} of k delta, {off:.2e} off");
+            assert!((0.7..1.0).contains(&of_spring), "{nodes} {depth}: {of_spring}");
+            assert!(off < 0.2, "{nodes} {depth}: {off}");
         }
     }
 }
@@ -265,15 +261,14 @@ fn a_plate_with_little_restitution_gains_no_energy_at_its_corners() {
         ContactParams { normal_stiffness: 2e4, restitution: 0.05, ..ContactParams::default() };
     let plate = box_laid_on_the_floor([8.0, 5.0, 1.0], params, DVec3::Z * -9.81);
     println!("plate: v {:.1e}, omega {}", plate.velocity.length(), plate.angular_velocity);
-    assert!(plate.velocity.length() < 5e-3, "{}", plate.velocity);
+    assert!(plate.velocity.length() < 1e-9, "{}", plate.velocity);
     assert!((plate.pose.position.z - 0.5e-3).abs() < 0.01e-3, "{}", plate.pose.position);
 }
 
 #[test]
-fn a_flat_box_hardly_moves_on_a_slope_below_the_friction_angle() {
-    // Slope 20 degrees, friction angle 26.6 degrees. The stiff contact touches at single points of
-    // the sampled face and jumps from one to another, so that the box creeps at 2 to 6 mm/s. With a
-    // friction spring that the dashpot winds backwards it slid at 28 mm/s (results/flat-grains).
+fn a_flat_box_rests_on_a_slope_below_the_friction_angle() {
+    // Slope 20 degrees, friction angle 26.6 degrees. With normal forces that are no gradient of an
+    // energy the box creeps at 2 to 6 mm/s (results/flat-grains).
     let (s, c) = 20f64.to_radians().sin_cos();
     let params = ContactParams {
         normal_stiffness: 28_840.0,
@@ -283,8 +278,8 @@ fn a_flat_box_hardly_moves_on_a_slope_below_the_friction_angle() {
     };
     let block = box_laid_on_the_floor([6.0, 5.0, 2.0], params, 9.81 * DVec3::new(s, 0.0, -c));
     println!("box on a slope: v {}, x {:.1e}", block.velocity, block.pose.position.x);
-    assert!(block.velocity.length() < 5e-3, "{}", block.velocity);
-    assert!(block.pose.position.x < 0.6e-3, "{}", block.pose.position);
+    assert!(block.velocity.length() < 1e-9, "{}", block.velocity);
+    assert!(block.pose.position.x < 0.1e-3, "{}", block.pose.position);
 }
 
 /// A scanned rock of 0.5 mm, thrown onto a floor with a stiffness that keeps overlaps far below the
@@ -301,8 +296,8 @@ fn thrown_rock(params: ContactParams, seed: u64) -> (ContactDynamics, [Grain; 1]
 
 #[test]
 fn dropped_rocks_come_to_rest() {
-    // A search that ends in a random local minimum of the surface keeps all of them bouncing at 4
-    // to 75 mm/s. Now and then a rock rocks for long from one foot to another.
+    // A search for the deepest point that misses more than the overlap at rest keeps them moving.
+    // Now and then a rock rocks for long from one foot to another.
     let mut at_rest = 0;
     for seed in 1..=6 {
         let params = ContactParams { restitution: 0.5, friction: 0.4, ..Default::default() };
@@ -315,7 +310,7 @@ fn dropped_rocks_come_to_rest() {
             }
         }
         println!("rock {seed}: up to {fastest:.1e} m/s");
-        at_rest += i32::from(fastest < 1e-3);
+        at_rest += i32::from(fastest < 1e-8);
     }
     assert!(at_rest >= 5, "{at_rest}");
 }
@@ -342,11 +337,11 @@ fn an_undamped_rock_keeps_its_energy_over_many_bounces() {
         }
         let most = errors.iter().map(|error| error.abs()).fold(0.0, f64::max);
         println!("rock {seed}: {bounces} bounces, energy within {most:.3}");
-        assert!(bounces > 10 && most < 0.25, "{bounces} {most}");
+        assert!(bounces > 10 && most < 0.02, "{bounces} {most}");
         sum += most;
     }
-    // 0.27 with a search that ends in a random local minimum.
-    assert!(sum / 4.0 < 0.13, "{sum}");
+    // 0.1 with a force that is shared in proportion to the overlaps.
+    assert!(sum / 4.0 < 0.01, "{sum}");
 }
 
 #[test]
@@ -374,8 +369,8 @@ fn a_spinning_top_on_its_face_is_stopped_by_the_friction_of_its_whole_face() {
 }
 
 #[test]
-fn elastic_irregular_bounces_keep_their_energy_on_average() {
-    // Not to round-off: total force and lever arm are different estimates from one patch.
+fn elastic_irregular_bounces_keep_their_energy() {
+    // Not to round-off: the sub-steps cross kinks of the sampled surface.
     let mut random = Random(23);
     let params = ContactParams { substeps_per_contact: 50.0, ..smooth(2e5) };
     let (mut sum, mut square, count) = (0.0, 0.0, 16);
@@ -403,7 +398,7 @@ fn elastic_irregular_bounces_keep_their_energy_on_average() {
     }
     let (mean, rms) = (sum / f64::from(count), (square / f64::from(count)).sqrt());
     println!("elastic bounces of a pebble: energy mean {mean:.1e}, rms {rms:.1e}");
-    assert!(mean.abs() < 0.02 && rms < 0.05, "{mean} {rms}");
+    assert!(mean.abs() < 1e-3 && rms < 2e-3, "{mean} {rms}");
 }
 
 #[test]
@@ -498,4 +493,64 @@ fn a_sphere_keeps_its_spin_on_a_frictionless_face() {
     println!("{} {velocity} {angular_velocity}", pose.position);
     assert!((velocity - DVec3::new(0.2, 0.0, 0.0)).length() < 1e-6, "{velocity}");
     assert!((angular_velocity - DVec3::new(0.0, 0.2, 0.0)).length() < 1e-7, "{angular_velocity}");
+}
+
+/// Two rocks that meet without friction and damping.
+#[test]
+fn a_collision_of_two_rocks_keeps_the_energy() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/grains/tsquare_rock.grain");
+    let rock = Shape::load(path.as_ref()).unwrap();
+    let rock = Arc::new(rock.scaled_to_equivalent_diameter(0.5e-3).unwrap());
+    let mut random = Random(7);
+    let mut worst = 0.0_f64;
+    for stiffness in [20.0, 2000.0] {
+        for _ in 0..10 {
+            let turn = |random: &mut Random| DQuat::from_scaled_axis(random.vector() * 3.0);
+            let mut grains = [
+                grain(&rock, DVec3::splat(0.01), turn(&mut random)),
+                grain(&rock, DVec3::new(0.0111, 0.0101, 0.01), turn(&mut random)),
+            ];
+            grains[0].velocity.x = 0.1;
+            grains[0].angular_velocity = random.vector() * 50.0;
+            let start = kinetic(&grains);
+            let mut dynamics = ContactDynamics::new(smooth(stiffness), open_box(0.02));
+            let mut touched = false;
+            for _ in 0..400 {
+                step(&mut dynamics, &mut grains, DVec3::ZERO, 5e-5);
+                touched |= !dynamics.contacts().is_empty();
+            }
+            assert!(touched && dynamics.contacts().is_empty());
+            let error = kinetic(&grains) / start - 1.0;
+            println!("stiffness {stiffness}: {error:.1e}");
+            worst = worst.max(error.abs());
+        }
+    }
+    println!("collisions of two rocks: energy {worst:.1e}");
+    assert!(worst < 0.01);
+}
+
+/// A prolate ellipsoid rolls about its long axis like a sphere: 5/7 g sin a.
+#[test]
+fn an_ellipsoid_rolls_down_a_slight_slope() {
+    let options = ShapeOptions::default();
+    let shape = Arc::new(analytic::ellipsoid(2e-3, 1e-3, 1e-3, &options).unwrap());
+    let params = ContactParams {
+        normal_stiffness: 1e4,
+        restitution: 0.5,
+        wall_friction: 0.5,
+        ..ContactParams::default()
+    };
+    for degrees in [0.5_f64, 2.0, 10.0] {
+        let (s, c) = degrees.to_radians().sin_cos();
+        // The long axis along y.
+        let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+        let mut grains = [grain(&shape, DVec3::Z * 1.001e-3, turn)];
+        let mut dynamics = ContactDynamics::new(params, floor());
+        for _ in 0..600 {
+            step(&mut dynamics, &mut grains, 9.81 * DVec3::new(s, 0.0, -c), 5e-4);
+        }
+        let ratio = grains[0].velocity.x / (5.0 / 7.0 * 9.81 * s * 0.3);
+        println!("ellipsoid on a slope of {degrees} degrees: {ratio:.4} of the exact speed");
+        assert!((ratio - 1.0).abs() < 0.03, "{degrees}: {ratio}");
+    }
 }

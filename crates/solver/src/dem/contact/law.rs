@@ -79,16 +79,17 @@ pub(in crate::dem) struct ContactCoefficients {
 
 /// Force law of a pair.
 ///
-/// A law sees the deepest overlap of the pair. The pair's force is distributed over the penetrating
-/// points by `ContactModel`, which also applies Coulomb's bound.
+/// A law sees the effective overlap of the pair. `ContactModel` distributes the pair's force over
+/// the penetrating points and applies Coulomb's bound.
 pub(in crate::dem) trait ContactLaw: Debug + Send + Sync {
     /// Forces and coefficients at `overlap` [m], positive.
     fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients;
 
-    /// Normal force [N], positive in compression, for the closing speed `approach` [m/s]; a law
-    /// without cohesion does not pull.
-    fn normal_force(&self, at: &ContactCoefficients, damping: f64, approach: f64) -> f64 {
-        (at.normal_force + damping * approach).max(0.0)
+    /// Normal force [N], positive in compression, of the elastic force and of a dashpot with the
+    /// coefficient `damping` [N s/m] at the closing speed `approach` [m/s]; a law without cohesion
+    /// does not pull.
+    fn normal_force(&self, elastic_force: f64, damping: f64, approach: f64) -> f64 {
+        (elastic_force + damping * approach).max(0.0)
     }
 
     /// Duration of an undamped contact [s] that is closing at `speed` [m/s] at `overlap` [m].

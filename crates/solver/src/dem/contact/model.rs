@@ -1,10 +1,18 @@
 //! Loads of a pair: normal force and friction of its penetrating points (Eqs 9-18), or lubrication
 //! across a gap.
 //!
-//! The force law acts on the deepest overlap of the pair. Its force is distributed over the
-//! penetrating points in proportion to area times overlap, so that the stiffness does not depend on
-//! the number of nodes; a single point receives Eq. 9. Friction is an incremental spring with
-//! Coulomb's bound (Eqs 12-15).
+//! The energy of the normal force is a function of one effective overlap D of the pair, a smooth
+//! mean of the overlaps d_i of its penetrating points with areas a_i. The contact conserves energy,
+//! and its stiffness does not depend on the number of points:
+//!
+//! ```text
+//! w_i = a_i d_i^p / sum_j a_j d_j^p      weights
+//! D   = sum_i w_i d_i                    effective overlap
+//! F_i = -F(D) dD/dd_i n_i                force at point i
+//! ```
+//!
+//! A single point receives Eq. 9. Dashpot and friction are shared by the weights. Friction is an
+//! incremental spring with Coulomb's bound (Eqs 12-15).
 
 use std::sync::Arc;
 
@@ -16,13 +24,21 @@ use super::{ContactRecord, PairLoads, TangentialHistory};
 use crate::dem::search::{ClosestPoint, ContactPoint};
 use crate::math::{Load, RigidVelocity};
 
-/// Averages over a contact patch, weighted with area times overlap.
+/// Exponent p of the overlaps in the weights of a patch. A larger one brings D closer to the
+/// deepest overlap and makes a flat patch stiffer against tilting, which needs shorter sub-steps.
+const EXPONENT: i32 = 8;
+
+/// Effective overlap of a patch, and means over its points with the weights w_i.
 #[derive(Clone, Copy, Debug)]
 struct PatchMean {
     /// Deepest overlap [m].
     overlap: f64,
-    /// Sum of area times overlap [m^3].
+    /// Effective overlap D [m].
+    effective_overlap: f64,
+    /// Sum of a_i d_i^p over the deepest overlap to the power of p [m^2].
     total: f64,
+    /// Sum of dD/dd_i: effective overlap gained per distance that the patch moves inwards.
+    gain: f64,
     /// Mean of the unit normals; shorter than one if they differ.
     normal: DVec3,
     /// Mean lever arm [m].
@@ -34,25 +50,43 @@ struct PatchMean {
 impl PatchMean {
     fn of(points: &[ContactPoint], pair: &PairKinematics) -> Option<PatchMean> {
         let overlap = points.iter().map(|p| p.overlap).fold(0.0, f64::max);
-        let total: f64 = points.iter().map(|p| p.area * p.overlap).sum();
-        if overlap <= 0.0 || total <= 0.0 {
+        if overlap <= 0.0 {
             return None;
         }
         let mut mean = PatchMean {
             overlap,
-            total,
+            effective_overlap: 0.0,
+            total: 0.0,
+            gain: 0.0,
             normal: DVec3::ZERO,
             lever_arm: DVec3::ZERO,
             approach: 0.0,
         };
         for point in points {
-            let share = point.area * point.overlap / total;
+            let weight = point.area * (point.overlap / overlap).powi(EXPONENT);
             let velocity = relative_velocity(&pair.end_of_step, point, pair.branch);
-            mean.normal += share * point.normal;
-            mean.lever_arm += share * point.lever_arm;
-            mean.approach += share * velocity.dot(point.normal);
+            mean.total += weight;
+            mean.effective_overlap += weight * point.overlap;
+            mean.normal += weight * point.normal;
+            mean.lever_arm += weight * point.lever_arm;
+            mean.approach += weight * velocity.dot(point.normal);
         }
+        let scale = 1.0 / mean.total;
+        mean.effective_overlap *= scale;
+        mean.normal *= scale;
+        mean.lever_arm *= scale;
+        mean.approach *= scale;
+        mean.gain = points.iter().map(|p| p.slope * mean.weight_and_derivative(p).1).sum();
         Some(mean)
+    }
+
+    /// Weight w_i of a point and dD/dd_i.
+    fn weight_and_derivative(&self, point: &ContactPoint) -> (f64, f64) {
+        let ratio = point.overlap / self.overlap;
+        let p = f64::from(EXPONENT);
+        let slope = point.area / self.total * ratio.powi(EXPONENT - 1);
+        let derivative = slope * ((p + 1.0) * ratio - p * self.effective_overlap / self.overlap);
+        (slope * ratio, derivative)
     }
 }
 
@@ -100,7 +134,7 @@ impl ContactModel {
             }
             return;
         };
-        let at = self.law.coefficients(properties, mean.overlap);
+        let at = self.law.coefficients(properties, mean.effective_overlap);
         let time_in_contact = begin_or_continue(record, &mean, step);
         let damping = record.dashpot_fraction * at.normal_damping;
         let friction = FrictionStep {
@@ -126,9 +160,8 @@ impl ContactModel {
         friction: &FrictionStep,
         pair: &PairKinematics,
     ) {
-        // The normals of a patch hardly differ. On opposite flanks they may cancel; the length of
-        // their mean then bounds the amplification of the remaining force.
-        let scale = 1.0 / mean.normal.length().max(0.9);
+        // Elastic force of the whole pair.
+        let elastic_force = at.normal_force * mean.gain;
         let normal = mean.normal.normalize_or(record.patch.points[0].normal);
         let mut loads = PairLoads {
             overlap: mean.overlap,
@@ -140,14 +173,16 @@ impl ContactModel {
         let (mut mean_displacement, mut known) = (DVec3::ZERO, 0);
         record.next_history.clear();
         for point in &record.patch.points {
-            let share = point.area * point.overlap / mean.total;
+            let (share, derivative) = mean.weight_and_derivative(point);
             // The local closing speed also damps rocking on a flat face.
             let approach =
                 relative_velocity(&pair.end_of_step, point, pair.branch).dot(point.normal);
             let damping =
                 pair.stable_damping(damping, point.lever_arm, point.normal, friction.step);
-            let normal_force = self.law.normal_force(at, damping, approach);
-            let mut force = -(normal_force * share * scale) * point.normal;
+            let normal_force = self.law.normal_force(elastic_force, damping, approach);
+            let dashpot_force = share * (normal_force - elastic_force);
+            let mut force =
+                -(at.normal_force * derivative * point.slope + dashpot_force) * point.normal;
             if friction.stiffness > 0.0 && friction.coefficient > 0.0 {
                 while record.history.get(known).is_some_and(|h| h.id < point.id) {
                     known += 1;
@@ -185,7 +220,7 @@ impl ContactModel {
         step: f64,
     ) -> PairLoads {
         let (params, range) = (&self.params, self.range());
-        if closest.gap >= range {
+        if closest.gap.max(0.0) >= range {
             return PairLoads::default();
         }
         let strength = 6.0

@@ -2,7 +2,8 @@
 //!
 //! Layout, little-endian: signature and version; number of grains and their positions at the end of
 //! the last step; number of pairs in contact and each pair; number of contacts and each contact.
-//! Version 1 has no tangential stiffness in its pairs; it is read as well.
+//! Older versions are read as well. Version 1 has no tangential stiffness in its pairs. Versions 1
+//! and 2 have other contact points than today; a pair keeps its mean displacement.
 
 use std::io::{self, Read, Write};
 
@@ -14,7 +15,7 @@ use crate::dem::enclosure::{PairKey, Partner};
 use crate::math::Load;
 
 const SIGNATURE: [u8; 7] = *b"GWDEM\0\0";
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 const WALL: u64 = 1 << 63;
 /// Largest number of grains, pairs, contacts or contact points.
 const LIMIT: u64 = u32::MAX as u64;
@@ -164,6 +165,9 @@ fn decode_record(input: &mut Decoder, grains: usize, version: u8) -> io::Result<
     })?;
     if !record.history.is_sorted_by(|a, b| a.id < b.id) {
         return Err(damaged("its contact points are out of order"));
+    }
+    if version < 3 {
+        record.history.clear();
     }
     Ok(record)
 }

@@ -1,190 +1,28 @@
-//! Deepest point of a contact: the point of a surface with the smallest distance in the field of
-//! the partner.
-//!
-//! On a rough surface the distance has several local minima, and a contact is often shallower than
-//! the differences between them. A search that ends in any one of them makes the overlap jump, and
-//! every jump changes the energy of the spring. The search therefore starts from every node below
-//! which the deepest point may lie (`docs/decisions/0024-deepest-point.md`). Within a step its
-//! minima are used again until the surfaces have moved by a fraction of the overlap; then descents
-//! start from them, until another minimum may have become the deepest.
+//! Point of a surface with the smallest distance in the field of a partner: where a sphere touches,
+//! and for gaps at the start of a run.
 
 use glam::{DMat2, DVec2, DVec3};
 use grainwake_shape::{Field, Shape};
 
-use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint, project_to_surface};
+use super::surface::{PartnerField, PosedShape, SurfacePoint, project_to_surface};
 
-/// Largest depth of the surface below its nodes that the search assumes [node spacings]. A larger
-/// value finds more of the minima and costs more descents.
-pub(super) const DEPTH_BELOW_NODES: f64 = 0.1;
-/// Least distance between the nodes from which descents start [node spacings].
-const START_DISTANCE: f64 = 1.0;
-/// Largest difference in depth between the deepest minimum and one that is kept [node spacings].
-const KEPT_DEPTH: f64 = 0.05;
-/// Distance below which two minima count as one [node spacings].
-const SAME_MINIMUM: f64 = 0.1;
-/// Least distance by which the surfaces move before the next search [node spacings].
-const LEAST_SLACK: f64 = 0.002;
-/// Distance by which the surfaces move before the next search, over the overlap or the gap.
-const RELATIVE_SLACK: f64 = 0.05;
 /// First and last radius of the compass search [node spacings].
 const COMPASS_RADII: [f64; 2] = [0.25, 0.02];
 /// Limits of a descent, with lengths in node spacings. The compass search that follows is finer.
 const DESCENT: DescentLimits = DescentLimits { stride: 1.0, tolerance: 0.02, iterations: 10 };
-/// Tolerance of a descent between spheres and walls, which ends at the minimum [node spacings].
-const TOLERANCE_OF_SPHERES: f64 = 1e-5;
 
-/// Local minima of the distance that the last search of a surface has found.
-#[derive(Debug, Default)]
-pub(super) struct LocalMinima {
-    /// Positions in the principal frame [m].
-    positions: Vec<DVec3>,
-    /// Distance by which the surfaces may move until descents start from these positions [m].
-    slack: f64,
-    /// Distance by which the surfaces may move until another minimum may be the deepest [m].
-    range: f64,
-    /// Distances [m] and indices of the nodes below which the deepest point may lie.
-    near: Vec<(f64, u32)>,
-    /// Results of the descents of a search.
-    found: Vec<SurfacePoint>,
-    /// Nodes from which they started.
-    starts: Vec<DVec3>,
+/// Deepest point of a sphere in the field of a sampled shape, from the nearest node.
+pub(super) fn deepest_point_of_sphere(
+    sphere: &PosedShape,
+    partner: &PartnerField,
+    nearest: SurfacePoint,
+) -> SurfacePoint {
+    minimise_distance(sphere.shape, partner, nearest, DESCENT.scaled(sphere.tree.spacing))
 }
 
-impl LocalMinima {
-    /// Discards the minima.
-    pub fn reset(&mut self) {
-        (self.slack, self.range) = (0.0, 0.0);
-    }
-
-    /// Records that the surfaces may have approached each other by `displacement` [m].
-    pub fn approach(&mut self, displacement: f64) {
-        self.slack -= GRADIENT_MARGIN * displacement;
-        self.range -= GRADIENT_MARGIN * displacement;
-    }
-
-    /// Finds the point of the surface of `owner` with the smallest distance. `nearest` is the
-    /// nearest node; `near` has the distances [m] and indices of at least all nodes that are
-    /// farther away by less than [`DEPTH_BELOW_NODES`].
-    pub fn find(
-        &mut self,
-        owner: &PosedShape,
-        partner: &PartnerField,
-        nearest: SurfacePoint,
-        near: &[(f64, u32)],
-    ) -> SurfacePoint {
-        if has_one_minimum(owner.shape, partner) {
-            let limits = DescentLimits { tolerance: TOLERANCE_OF_SPHERES, ..DESCENT };
-            let limits = limits.scaled(owner.tree.spacing);
-            return steepest_descent(owner.shape, partner, nearest, limits);
-        }
-        self.descend_from_nodes(owner, partner, nearest, near);
-        let (deepest, kept) = self.keep_deepest(owner, partner);
-        self.range = 0.5 * kept;
-        deepest
-    }
-
-    /// Deepest of the known minima; `None` if another point may be deeper.
-    pub fn deepest_known(
-        &mut self,
-        owner: &PosedShape,
-        partner: &PartnerField,
-    ) -> Option<SurfacePoint> {
-        if self.range <= 0.0 {
-            return None;
-        }
-        let points = self.positions.iter().filter_map(|x| SurfacePoint::at(partner, *x));
-        if self.slack > 0.0 {
-            return points.min_by(|a, b| a.distance.total_cmp(&b.distance));
-        }
-        let limits = DESCENT.scaled(owner.tree.spacing);
-        let descents = points.map(|point| steepest_descent(owner.shape, partner, point, limits));
-        self.found.clear();
-        self.found.extend(descents);
-        (!self.found.is_empty()).then(|| self.keep_deepest(owner, partner).0)
-    }
-
-    /// Keeps the deepest minima of `self.found`, which must not be empty. Returns the deepest, and
-    /// the least difference in depth between it and a minimum that is not kept [m].
-    fn keep_deepest(&mut self, owner: &PosedShape, partner: &PartnerField) -> (SurfacePoint, f64) {
-        let spacing = owner.tree.spacing;
-        self.found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        let mut deepest = self.found[0];
-        let slack = |deepest: &SurfacePoint| {
-            (LEAST_SLACK * spacing).max(RELATIVE_SLACK * deepest.distance.abs())
-        };
-        // While the deepest recedes by the slack, another one may approach by as much.
-        let kept = (KEPT_DEPTH * spacing).max(2.0 * slack(&deepest));
-        let radii = COMPASS_RADII.map(|radius| radius * spacing);
-        self.positions.clear();
-        for &minimum in &self.found {
-            let is_same = |x: &DVec3| x.distance(minimum.position) < SAME_MINIMUM * spacing;
-            let is_deep = minimum.distance < deepest.distance + kept;
-            if !is_deep || self.positions.iter().any(is_same) {
-                continue;
-            }
-            let minimum = compass_search(owner.shape, partner, minimum, radii);
-            if minimum.distance < deepest.distance {
-                deepest = minimum;
-            }
-            self.positions.push(minimum.position);
-        }
-        self.slack = slack(&deepest);
-        (deepest, kept)
-    }
-
-    /// Descends from the nodes below which the deepest point may lie; `self.found` has the results.
-    fn descend_from_nodes(
-        &mut self,
-        owner: &PosedShape,
-        partner: &PartnerField,
-        nearest: SurfacePoint,
-        near: &[(f64, u32)],
-    ) {
-        let (spacing, nodes) = (owner.tree.spacing, &owner.tree.nodes);
-        let limits = DESCENT.scaled(spacing);
-        let first = steepest_descent(owner.shape, partner, nearest, limits);
-        let mut deepest = first.distance;
-        self.found.clear();
-        self.found.push(first);
-        self.starts.clear();
-        self.starts.push(nearest.position);
-        let depth = DEPTH_BELOW_NODES * spacing;
-        let limit = if nearest.distance < depth { nearest.distance + depth } else { 0.0 };
-        self.near.clear();
-        self.near.extend(near.iter().filter(|(distance, _)| *distance < limit));
-        self.near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(distance, index) in &self.near {
-            if distance >= deepest + depth {
-                break;
-            }
-            let node = nodes[index as usize].position;
-            let is_close = |start: &DVec3| start.distance(node) < START_DISTANCE * spacing;
-            if self.starts.iter().any(is_close) {
-                continue;
-            }
-            self.starts.push(node);
-            if let Some(start) = SurfacePoint::at(partner, node) {
-                let minimum = steepest_descent(owner.shape, partner, start, limits);
-                deepest = deepest.min(minimum.distance);
-                self.found.push(minimum);
-            }
-        }
-    }
-}
-
-/// Returns true for a sphere whose partner is a sphere or a wall: the distance then has a single
-/// minimum on its surface.
-fn has_one_minimum(surface: &Shape, partner: &PartnerField) -> bool {
-    let is_wall = matches!(partner, PartnerField::HalfSpace { .. });
-    is_sphere(surface) && (is_wall || partner_is_sphere(partner))
-}
-
-fn is_sphere(shape: &Shape) -> bool {
+/// Whether the shape is an exact sphere.
+pub(super) fn is_sphere(shape: &Shape) -> bool {
     matches!(shape.field(), Field::Sphere(_))
-}
-
-fn partner_is_sphere(partner: &PartnerField) -> bool {
-    matches!(partner, PartnerField::Shape { shape, .. } if is_sphere(shape))
 }
 
 /// Limits of a descent.
@@ -298,7 +136,7 @@ fn compass_search(
             moves += 1;
             continue;
         }
-        if 0.5 * radius <= last && (is_sphere(surface) || partner_is_sphere(partner)) {
+        if 0.5 * radius <= last && (is_sphere(surface) || partner.is_sphere()) {
             let by = vertex(point.distance, &ring, &around, radius);
             let next = by.and_then(|by| SurfacePoint::at(partner, moved(point.position, by)));
             return next.filter(|next| next.distance < point.distance).unwrap_or(point);
@@ -340,7 +178,6 @@ fn vertex(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dem::search::node_tree::NodeTree;
     use glam::DMat3;
 
     #[test]
@@ -361,57 +198,5 @@ mod tests {
         let point = deepest(&field, start);
         assert!((point.distance + 0.02).abs() < 1e-12, "{}", point.distance);
         assert!((point.position + 2.0 * direction).length() < 1e-6);
-    }
-
-    #[test]
-    fn the_deepest_point_of_a_rough_grain_is_the_deepest_of_a_dense_search() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/grains/tsquare_rock.grain");
-        let shape = Shape::load(path.as_ref()).unwrap();
-        let tree = NodeTree::new(&shape);
-        let owner = PosedShape {
-            shape: &shape,
-            tree: &tree,
-            rotation: DMat3::IDENTITY,
-            position: DVec3::ZERO,
-        };
-        // Points of the surface, a quarter of a spacing apart.
-        let dense: Vec<DVec3> = (tree.nodes.iter())
-            .flat_map(|node| {
-                let (_, gradient) = shape.distance_and_gradient(node.position);
-                let (u, v) = gradient.normalize().any_orthonormal_pair();
-                let offsets = (-3..=3).flat_map(move |i| (-3..=3).map(move |j| (i, j)));
-                let step = 0.25 * tree.spacing;
-                offsets
-                    .map(move |(i, j)| node.position + step * (f64::from(i) * u + f64::from(j) * v))
-            })
-            .map(|x| project_to_surface(&shape, x))
-            .collect();
-        // Depth missed by the search, and by a search from the nearest node alone.
-        let mut missed = [Vec::new(), Vec::new()];
-        for n in 0..200 {
-            let t = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(n);
-            let normal = (2.0 * t.fract() - DVec3::ONE).normalize();
-            let wall = PartnerField::HalfSpace { normal, offset: 0.0 };
-            let mut distances: Vec<(f64, u32)> = (tree.nodes.iter().zip(0..))
-                .map(|(node, index)| (wall.distance(node.position), index))
-                .collect();
-            distances.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let nearest = tree.nodes[distances[0].1 as usize].position;
-            let start = SurfacePoint::at(&wall, nearest).unwrap();
-            let limit = distances[0].0 + DEPTH_BELOW_NODES * tree.spacing;
-            let near = &distances[..distances.partition_point(|(d, _)| *d < limit)];
-            let exact = dense.iter().map(|x| wall.distance(*x)).fold(f64::INFINITY, f64::min);
-            for (near, missed) in [near, &[]].into_iter().zip(&mut missed) {
-                let deepest = LocalMinima::default().find(&owner, &wall, start, near);
-                missed.push((deepest.distance - exact) / tree.spacing);
-            }
-        }
-        let [[most, wrong], [most_alone, wrong_alone]] = missed.map(|missed| {
-            let most = missed.iter().copied().fold(0.0, f64::max);
-            [most, missed.iter().filter(|missed| **missed > 1e-3).count() as f64]
-        });
-        println!("missed: {most:.1e} spacings, {wrong} of 200; {most_alone:.1e}, {wrong_alone}");
-        assert!(most < 0.03 && wrong <= 10.0, "{most} {wrong}");
-        assert!(wrong_alone > 1.5 * wrong, "{most_alone} {wrong_alone}");
     }
 }

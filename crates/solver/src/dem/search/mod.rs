@@ -10,6 +10,7 @@ mod gap;
 mod narrow_phase;
 mod node_scan;
 mod node_tree;
+mod patches;
 mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};

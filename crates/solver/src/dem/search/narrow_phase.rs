@@ -1,13 +1,11 @@
 //! Narrow phase: contact patch of a pair, from the surface nodes of each grain in the distance
-//! field of its partner and the deepest point of the surface (Eqs 7-8).
+//! field of its partner (Eqs 7-8). A sphere touches at its deepest point.
 
 use glam::DVec3;
-use grainwake_shape::Shape;
 
-use super::node_scan::{
-    PenetratingPoint, SurfaceMemory, follow_contact, scan_candidates, scan_nodes,
-};
-use super::surface::{PartnerField, PosedShape, SurfacePoint, project_to_surface};
+use super::deepest_point::{deepest_point_of_sphere, is_sphere};
+use super::node_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_nodes};
+use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint};
 
 /// Penetrating point of a pair, space frame.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +20,8 @@ pub(in crate::dem) struct ContactPoint {
     pub lever_arm: DVec3,
     /// Unit normal out of the first grain, into its partner (Eq. 8).
     pub normal: DVec3,
+    /// Overlap gained per displacement along the normal.
+    pub slope: f64,
 }
 
 /// Closest point of a pair without contact, space frame.
@@ -86,9 +86,21 @@ impl ContactPatch {
         let (bound_b, closest_b) = self.search_surface(1, b, &field_of_a, reach, |p| {
             (b.rotation * p.position - branch, b.rotation * p.normal)
         });
-        let closest = closest_a.into_iter().chain(closest_b);
-        let closest = closest.min_by(|a, b| a.gap.total_cmp(&b.gap));
-        self.finish(closest, bound_a.max(bound_b), reach)
+        let closest = match (is_sphere(a.shape), is_sphere(b.shape)) {
+            (true, false) => {
+                self.keep_other_normals(closest_a, |id| id & SECOND_GRAIN != 0);
+                closest_a
+            }
+            (false, true) => {
+                self.keep_other_normals(closest_b, |id| id & SECOND_GRAIN == 0);
+                closest_b
+            }
+            _ => {
+                let both = closest_a.into_iter().chain(closest_b);
+                both.min_by(|a, b| a.gap.total_cmp(&b.gap))
+            }
+        };
+        self.finish(closest, bound_a.min(bound_b), reach)
     }
 
     /// Finds the penetrating points of a grain in a wall with the unit normal `inward`, at the
@@ -131,13 +143,37 @@ impl ContactPatch {
         self.points.extend(self.found.iter().map(|found| {
             let (lever_arm, normal) = to_space(&found.point);
             let id = if grain == 0 { found.id } else { found.id | SECOND_GRAIN };
-            ContactPoint { id, overlap: -found.point.distance, area: found.area, lever_arm, normal }
+            ContactPoint {
+                id,
+                overlap: -found.point.distance,
+                area: found.area,
+                lever_arm,
+                normal,
+                slope: found.point.slope,
+            }
         }));
         let closest = closest.map(|point| {
             let (lever_arm, normal) = to_space(&point);
             ClosestPoint { gap: point.distance, lever_arm, normal }
         });
         (bound, closest)
+    }
+
+    /// Reduces the areas of the nodes that touch a sphere, which `is_node` selects, where they
+    /// belong to the contact of the sphere's own point: the sphere would roll over them as over
+    /// bumps. Nodes with other normals, as in a groove, keep their areas.
+    fn keep_other_normals(
+        &mut self,
+        of_sphere: Option<ClosestPoint>,
+        is_node: impl Fn(u32) -> bool,
+    ) {
+        let Some(of_sphere) = of_sphere else { return };
+        let [same, other] = PATCH_ANGLES.map(f64::cos);
+        for point in self.points.iter_mut().filter(|point| is_node(point.id)) {
+            let cosine = point.normal.dot(of_sphere.normal);
+            point.area *= ((same - cosine) / (same - other)).clamp(0.0, 1.0);
+        }
+        self.points.retain(|point| point.area > 0.0);
     }
 
     /// Sets the separation after a search that found the closest point, if near; returns that point
@@ -148,34 +184,27 @@ impl ContactPatch {
         node_bound: f64,
         reach: f64,
     ) -> Option<ClosestPoint> {
-        // Half of the gap may close before the pair is searched again.
-        let bound = closest.map_or(node_bound, |point| node_bound.max(0.5 * point.gap));
-        self.separation = if self.points.is_empty() { bound - reach } else { 0.0 };
+        self.separation = if self.points.is_empty() { node_bound - reach } else { 0.0 };
         closest.filter(|point| point.gap < reach)
     }
 }
 
 /// Bit that marks the points of the second grain in a point identifier.
 const SECOND_GRAIN: u32 = 1 << 31;
-/// Identifier of the deepest point, which is not a node. Node n has the identifier 2 n and its
-/// mirror point 2 n + 1.
+/// Identifier of the deepest point of a sphere, which is not a node.
 const DEEPEST_POINT: u32 = SECOND_GRAIN - 1;
 
-/// Area of the deepest point [node areas]. The deepest point carries the contact before the first
-/// node penetrates, and counts little in a patch of many nodes.
-const DEEPEST_POINT_AREA: f64 = 1.0;
-/// A mirror point is used if the surface lies within this fraction of its distance from the deepest
-/// point.
-const MIRROR_TOLERANCE: f64 = 0.3;
-/// A patch with more nodes is resolved and needs no mirror points.
-const RESOLVED: usize = 128;
 /// Range of the search for the nearest node [node spacings]; bounds the separation of the pair.
 const SEARCH_RANGE: f64 = 3.0;
-/// Largest distance of a surface point from the nearest node [node spacings].
+/// Largest distance of a point of a sphere from the nearest node [node spacings].
 const NODE_COVERAGE: f64 = 1.2;
 
-/// Tests the nodes of `owner` in the field of its partner (Eq. 7). Penetrating points go to `found`
-/// in ascending identifier.
+/// Angles between the normals of two points up to which they belong to one patch of a sphere, and
+/// from which to two [rad].
+const PATCH_ANGLES: [f64; 2] = [0.35, 0.7];
+
+/// Tests the surface of `owner` in the field of its partner (Eq. 7): a sphere at its deepest point,
+/// other shapes at their nodes. Penetrating points go to `found` in ascending identifier.
 ///
 /// Returns a lower bound of the distance between surface and partner [m], and the closest point of
 /// the surface if it may be nearer than `reach` [m]. `memory` is that of the last search in the
@@ -187,76 +216,42 @@ fn scan_surface(
     memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
 ) -> (f64, Option<SurfacePoint>) {
-    let tree = owner.tree;
-    if let Some(deepest) = follow_contact(owner, partner, memory, found) {
-        add_deepest_point(owner, partner, deepest, found);
-        return (f64::NEG_INFINITY, Some(deepest));
+    let (tree, is_sphere) = (owner.tree, is_sphere(owner.shape));
+    if is_sphere
+        && let Some(deepest) = partner.deepest_point_of_sphere(owner.shape.bounding_radius())
+    {
+        set_deepest(owner, Some(deepest), found);
+        return (deepest.distance, Some(deepest));
     }
     let range = NODE_COVERAGE * tree.spacing + reach;
     let nearest = scan_candidates(tree, partner, memory, found)
         .unwrap_or_else(|| scan_nodes(tree, partner, SEARCH_RANGE * range, memory, found));
     memory.nearest = nearest.index;
-    let separation = nearest.distance - NODE_COVERAGE * tree.spacing;
-    let start = nearest
+    let closest = nearest
         .index
         .filter(|_| nearest.distance < range)
-        .and_then(|index| SurfacePoint::at(partner, tree.nodes[index as usize].position));
-    let Some(start) = start else {
-        return (separation, None);
-    };
-    let deepest = memory.minima.find(owner, partner, start, &memory.candidates);
-    add_deepest_point(owner, partner, deepest, found);
-    (separation, Some(deepest))
+        .and_then(|index| tree.nodes[index as usize].deepest_point(partner));
+    if !is_sphere {
+        return (nearest.distance / GRADIENT_MARGIN, closest);
+    }
+    let deepest = closest.map(|start| deepest_point_of_sphere(owner, partner, start));
+    set_deepest(owner, deepest, found);
+    // Half of the gap may close before the pair is searched again.
+    let bound = nearest.distance - NODE_COVERAGE * tree.spacing;
+    (deepest.map_or(bound, |point| bound.max(0.5 * point.distance)), deepest)
 }
 
-/// Adds the deepest point to the penetrating nodes, if it penetrates, and mirror points to a patch
-/// of few nodes.
-fn add_deepest_point(
+/// Sets the deepest point of a sphere as the only one, if it penetrates.
+fn set_deepest(
     owner: &PosedShape,
-    partner: &PartnerField,
-    deepest: SurfacePoint,
+    deepest: Option<SurfacePoint>,
     found: &mut Vec<PenetratingPoint>,
 ) {
-    if deepest.distance >= 0.0 {
-        return;
-    }
-    if found.len() <= RESOLVED {
-        add_mirror_points(owner.shape, partner, deepest.position, found);
-    }
-    let area = DEEPEST_POINT_AREA * owner.tree.spacing * owner.tree.spacing;
-    found.push(PenetratingPoint { id: DEEPEST_POINT, area, point: deepest });
-}
-
-/// Shares the area of each node with its mirror image about the deepest point, if the image lies on
-/// the surface and penetrates.
-///
-/// The few nodes of a small patch have a centroid off that of the patch by a good part of their
-/// spacing, which tilts the force and gives it a lever arm. Mirror points remove this error for a
-/// symmetric patch and have no effect on average otherwise.
-fn add_mirror_points(
-    surface: &Shape,
-    partner: &PartnerField,
-    centre: DVec3,
-    found: &mut Vec<PenetratingPoint>,
-) {
-    let (_, gradient) = surface.distance_and_gradient(centre);
-    let axis = gradient.normalize_or_zero();
-    for index in 0..found.len() {
-        let node = found[index];
-        let offset = node.point.position - centre;
-        // Half a turn about the normal maps a surface of revolution onto itself.
-        let image = centre + 2.0 * offset.dot(axis) * axis - offset;
-        let position = project_to_surface(surface, image);
-        let off_surface = position.distance_squared(image)
-            > (MIRROR_TOLERANCE * MIRROR_TOLERANCE) * offset.length_squared();
-        let mirror = SurfacePoint::at(partner, position);
-        let Some(mirror) = mirror.filter(|p| !off_surface && p.distance < 0.0) else {
-            continue;
-        };
-        // Half the area at equal depth, none at zero depth: the split is continuous.
-        let share = 0.5 * (mirror.distance / node.point.distance).min(1.0);
-        found[index].area = (1.0 - share) * node.area;
-        found.push(PenetratingPoint { id: node.id + 1, area: share * node.area, point: mirror });
-    }
-    found.sort_unstable_by_key(|point| point.id);
+    let area = owner.tree.spacing * owner.tree.spacing;
+    found.clear();
+    found.extend(deepest.filter(|point| point.distance < 0.0).map(|point| PenetratingPoint {
+        id: DEEPEST_POINT,
+        area,
+        point,
+    }));
 }

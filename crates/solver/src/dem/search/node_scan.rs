@@ -1,9 +1,8 @@
 //! Nodes of one grain that penetrate its partner, and the nearest node: by the hierarchy of the
 //! nodes, or within a step by the candidates of the last search.
 
-use super::deepest_point::{DEPTH_BELOW_NODES, LocalMinima};
 use super::node_tree::NodeTree;
-use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint};
+use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint};
 
 /// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
 const CANDIDATE_RANGE: f64 = 0.5;
@@ -33,8 +32,6 @@ pub(super) struct SurfaceMemory {
     slack: f64,
     /// Nearest node.
     pub nearest: Option<u32>,
-    /// Local minima of the distance.
-    pub minima: LocalMinima,
 }
 
 impl SurfaceMemory {
@@ -42,14 +39,12 @@ impl SurfaceMemory {
     pub fn reset(&mut self) {
         self.candidates.clear();
         (self.slack, self.nearest) = (0.0, None);
-        self.minima.reset();
     }
 
     /// Records that the surfaces may have approached each other by `displacement` [m].
     pub fn approach(&mut self, displacement: f64) {
         self.slack -= GRADIENT_MARGIN * displacement;
         self.approach += GRADIENT_MARGIN * displacement;
-        self.minima.approach(displacement);
     }
 }
 
@@ -83,39 +78,26 @@ pub(super) fn scan_candidates(
     }
     found.clear();
     let mut nearest = NearestNode { distance: memory.slack, index: None };
+    // In a contact only the nodes matter that may penetrate.
+    for &(distance, index) in &memory.candidates {
+        if distance < memory.approach {
+            nearest.update(test_node(tree, partner, index, f64::INFINITY, found), index);
+        }
+    }
+    if nearest.distance < 0.0 {
+        return Some(nearest);
+    }
+    found.clear();
     for (distance, index) in &mut memory.candidates {
         *distance = test_node(tree, partner, *index, f64::INFINITY, found);
         nearest.update(*distance, *index);
     }
     memory.approach = 0.0;
-    // The nodes below which the deepest point may lie must be candidates.
-    let depth = DEPTH_BELOW_NODES * tree.spacing;
-    let is_complete = nearest.distance >= depth || nearest.distance + depth <= memory.slack;
-    (nearest.index.is_some() && is_complete).then_some(nearest)
+    nearest.index.is_some().then_some(nearest)
 }
 
-/// Collects the penetrating nodes and returns the deepest point, from the last search in the same
-/// step; `None` if another node may penetrate or another point may be the deepest.
-pub(super) fn follow_contact(
-    owner: &PosedShape,
-    partner: &PartnerField,
-    memory: &mut SurfaceMemory,
-    found: &mut Vec<PenetratingPoint>,
-) -> Option<SurfacePoint> {
-    if memory.slack <= 0.0 {
-        return None;
-    }
-    let deepest = memory.minima.deepest_known(owner, partner)?;
-    found.clear();
-    for &(distance, index) in &memory.candidates {
-        if distance < memory.approach {
-            test_node(owner.tree, partner, index, f64::INFINITY, found);
-        }
-    }
-    Some(deepest)
-}
-
-/// Collects a node if it penetrates; returns its distance, or infinity beyond `reach` [m].
+/// Collects a patch if it penetrates; returns a lower bound of its distance, or infinity beyond
+/// `reach` [m].
 fn test_node(
     tree: &NodeTree,
     partner: &PartnerField,
@@ -123,12 +105,13 @@ fn test_node(
     reach: f64,
     found: &mut Vec<PenetratingPoint>,
 ) -> f64 {
-    let node = &tree.nodes[index as usize];
-    let distance = partner.distance_within(node.position, reach);
+    let patch = &tree.nodes[index as usize];
+    let distance = partner.distance_within(patch.position, reach + patch.extent) - patch.extent;
     if distance < 0.0
-        && let Some(point) = SurfacePoint::at(partner, node.position)
+        && let Some(point) = patch.deepest_point(partner)
+        && point.distance < 0.0
     {
-        found.push(PenetratingPoint { id: 2 * index, area: node.area, point });
+        found.push(PenetratingPoint { id: index, area: patch.area, point });
     }
     distance
 }
@@ -149,12 +132,16 @@ pub(super) fn scan_nodes(
     *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
-        nearest.update(partner.distance_within(node.position, range), index);
+        nearest.update(partner.distance_within(node.position, range) - node.extent, index);
     }
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
         // Only candidates and nodes nearer than the nearest one so far are of interest.
-        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(*slack)) {
+        if partner.is_beyond(
+            cluster.centre,
+            cluster.radius,
+            nearest.distance.max(*slack) + tree.extent,
+        ) {
             cluster_index = cluster.skip as usize;
             continue;
         }

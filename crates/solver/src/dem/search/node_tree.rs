@@ -1,7 +1,9 @@
 //! Hierarchy of the surface nodes of a shape, built once for each shape.
 
 use glam::DVec3;
-use grainwake_shape::{Shape, SurfaceNode};
+use grainwake_shape::Shape;
+
+use super::patches::{SurfacePatch, surface_patches};
 
 /// Most nodes of a leaf.
 const LEAF: usize = 8;
@@ -29,21 +31,24 @@ impl NodeCluster {
 /// Nodes and clusters of one shape.
 #[derive(Clone, Debug)]
 pub(in crate::dem) struct NodeTree {
-    /// Nodes in the order of the leaves.
-    pub nodes: Vec<SurfaceNode>,
+    /// Nodes and the further points of the surface, in the order of the leaves.
+    pub nodes: Vec<SurfacePatch>,
     /// Clusters in depth-first order.
     pub clusters: Vec<NodeCluster>,
-    /// Node spacing: square root of the mean node area [m].
+    /// Spacing of the shape's nodes: square root of their mean area [m].
     pub spacing: f64,
+    /// Largest extent of a patch [m].
+    pub extent: f64,
 }
 
 impl NodeTree {
     /// Builds the hierarchy of a shape by halving along the longest extent.
     pub fn new(shape: &Shape) -> NodeTree {
-        let nodes = shape.nodes().to_vec();
-        let area: f64 = nodes.iter().map(|n| n.area).sum();
-        let spacing = (area / nodes.len().max(1) as f64).sqrt();
-        let mut tree = NodeTree { nodes, clusters: Vec::new(), spacing };
+        let area: f64 = shape.nodes().iter().map(|n| n.area).sum();
+        let spacing = (area / shape.nodes().len().max(1) as f64).sqrt();
+        let nodes = surface_patches(shape, spacing);
+        let extent = nodes.iter().map(|n| n.extent).fold(0.0, f64::max);
+        let mut tree = NodeTree { nodes, clusters: Vec::new(), spacing, extent };
         if !tree.nodes.is_empty() {
             tree.split(0, tree.nodes.len());
         }

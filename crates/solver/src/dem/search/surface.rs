@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 use grainwake_shape::{Field, Shape};
 
+use super::deepest_point::is_sphere;
 use super::node_tree::NodeTree;
 
 /// Shape of a grain, or of a periodic image, at its pose.
@@ -104,6 +105,19 @@ impl<'a> PartnerField<'a> {
             }
         }
     }
+    /// Whether the partner is an exact sphere.
+    pub fn is_sphere(&self) -> bool {
+        matches!(self, PartnerField::Shape { shape, .. } if is_sphere(shape))
+    }
+    /// Point with the smallest distance on a sphere of `radius` [m] around the origin; `None` if
+    /// the partner is neither a sphere nor a wall, or a concentric sphere.
+    pub fn deepest_point_of_sphere(&self, radius: f64) -> Option<SurfacePoint> {
+        if !self.is_sphere() && !matches!(self, PartnerField::HalfSpace { .. }) {
+            return None;
+        }
+        let (_, gradient) = self.distance_and_gradient(DVec3::ZERO);
+        SurfacePoint::at(self, -radius * gradient.try_normalize()?)
+    }
     /// Radius of curvature for the first step of a descent [m].
     pub fn curvature_radius(&self) -> f64 {
         match self {
@@ -122,6 +136,8 @@ pub(super) struct SurfacePoint {
     pub distance: f64,
     /// Unit gradient of that distance.
     pub normal: DVec3,
+    /// Length of the gradient; differs from one between the samples of a field.
+    pub slope: f64,
 }
 
 impl SurfacePoint {
@@ -129,7 +145,7 @@ impl SurfacePoint {
     pub fn at(partner: &PartnerField, position: DVec3) -> Option<SurfacePoint> {
         let (distance, gradient) = partner.distance_and_gradient(position);
         let normal = gradient.try_normalize()?;
-        Some(SurfacePoint { position, distance, normal })
+        Some(SurfacePoint { position, distance, normal, slope: gradient.dot(normal) })
     }
 }
 
