@@ -50,7 +50,7 @@ struct PatchMean {
 impl PatchMean {
     fn of(points: &[ContactPoint], pair: &PairKinematics) -> Option<PatchMean> {
         let overlap = points.iter().map(|p| p.overlap).fold(0.0, f64::max);
-        if overlap <= 0.0 {
+        if overlap <= 0.0 || points.iter().all(|p| p.area <= 0.0) {
             return None;
         }
         let mut mean = PatchMean {
@@ -136,7 +136,8 @@ impl ContactModel {
         };
         let at = self.law.coefficients(properties, mean.effective_overlap);
         let time_in_contact = begin_or_continue(record, &mean, step);
-        let damping = record.dashpot_fraction * at.normal_damping;
+        // A patch of many points is softer than the spring of its law.
+        let damping = record.dashpot_fraction * at.normal_damping * mean.gain.clamp(0.0, 1.0);
         let friction = FrictionStep {
             coefficient: friction,
             stiffness: at.tangential_stiffness,
@@ -161,7 +162,7 @@ impl ContactModel {
         pair: &PairKinematics,
     ) {
         // Elastic force of the whole pair.
-        let elastic_force = at.normal_force * mean.gain;
+        let elastic_force = (at.normal_force * mean.gain).max(0.0);
         let normal = mean.normal.normalize_or(record.patch.points[0].normal);
         let mut loads = PairLoads {
             overlap: mean.overlap,

@@ -1,9 +1,11 @@
 //! Grain as a body of the contact search, and the evaluation of one pair.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3, IVec3};
 use grainwake_shape::Shape;
+use rayon::prelude::*;
 
 use super::integrator::{EffectiveInertia, GrainResponse, HalfStepVelocity};
 use crate::dem::contact::{
@@ -58,22 +60,35 @@ impl ContactBody {
         for body in &mut *bodies {
             body.contact = Load::default();
         }
+        let is_current = |body: &ContactBody, grain: &Grain| {
+            Arc::ptr_eq(&body.shape, &grain.shape) && body.material == grain.material
+        };
+        let same_length = bodies.len() == grains.len();
+        if same_length && bodies.iter().zip(grains).all(|(body, grain)| is_current(body, grain)) {
+            return;
+        }
+        let trees = ContactBody::trees(bodies, grains);
         for (i, grain) in grains.iter().enumerate() {
-            let same_shape = |body: &ContactBody| Arc::ptr_eq(&body.shape, &grain.shape);
-            let current = bodies.get(i).filter(|body| same_shape(body));
-            if current.is_some_and(|body| body.material == grain.material) {
-                continue;
-            }
-            let tree = match bodies.iter().find(|body| same_shape(body)) {
-                Some(known) => known.tree.clone(),
-                None => Arc::new(NodeTree::new(&grain.shape)),
-            };
-            let body = ContactBody::new(grain, tree);
+            let new = || ContactBody::new(grain, trees[&Arc::as_ptr(&grain.shape)].clone());
             match bodies.get_mut(i) {
-                Some(old) => *old = body,
-                None => bodies.push(body),
+                Some(body) if is_current(body, grain) => {}
+                Some(body) => *body = new(),
+                None => bodies.push(new()),
             }
         }
+    }
+
+    /// Trees of the shapes of `grains`, those of new shapes built in parallel.
+    fn trees(bodies: &[ContactBody], grains: &[Grain]) -> HashMap<*const Shape, Arc<NodeTree>> {
+        let known = bodies.iter().map(|body| (Arc::as_ptr(&body.shape), body.tree.clone()));
+        let mut trees: HashMap<_, _> = known.collect();
+        let mut new: Vec<&Arc<Shape>> = grains.iter().map(|grain| &grain.shape).collect();
+        new.retain(|shape| !trees.contains_key(&Arc::as_ptr(shape)));
+        new.sort_by_key(|shape| Arc::as_ptr(shape));
+        new.dedup_by_key(|shape| Arc::as_ptr(shape));
+        let built: Vec<_> = new.par_iter().map(|shape| Arc::new(NodeTree::new(shape))).collect();
+        trees.extend(new.iter().map(|shape| Arc::as_ptr(shape)).zip(built));
+        trees
     }
 
     fn new(grain: &Grain, tree: Arc<NodeTree>) -> ContactBody {

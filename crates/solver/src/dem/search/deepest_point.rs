@@ -2,27 +2,54 @@
 //! and for gaps at the start of a run.
 
 use glam::{DMat2, DVec2, DVec3};
-use grainwake_shape::{Field, Shape};
+use grainwake_shape::Shape;
 
-use super::surface::{PartnerField, PosedShape, SurfacePoint, project_to_surface};
+use super::node_tree::PosedShape;
+use super::surface::{PartnerField, SurfacePoint, is_sphere, project_to_surface};
 
 /// First and last radius of the compass search [node spacings].
 const COMPASS_RADII: [f64; 2] = [0.25, 0.02];
 /// Limits of a descent, with lengths in node spacings. The compass search that follows is finer.
 const DESCENT: DescentLimits = DescentLimits { stride: 1.0, tolerance: 0.02, iterations: 10 };
 
-/// Deepest point of a sphere in the field of a sampled shape, from the nearest node.
+/// Largest depth of a minimum below a node that the search assumes [node spacings].
+const DEPTH_BELOW_NODES: f64 = 0.1;
+/// Least distance between the nodes from which descents start [node spacings].
+const START_DISTANCE: f64 = 1.0;
+/// Most descents.
+const MOST_STARTS: usize = 8;
+
+/// Deepest point of a sphere in the field of a sampled shape, whose distance may have several
+/// minima: from the nearest node, and from the nodes among `candidates` (distance [m] and index)
+/// below which the deepest point may lie.
 pub(super) fn deepest_point_of_sphere(
     sphere: &PosedShape,
     partner: &PartnerField,
     nearest: SurfacePoint,
+    candidates: &[(f64, u32)],
 ) -> SurfacePoint {
-    minimise_distance(sphere.shape, partner, nearest, DESCENT.scaled(sphere.tree.spacing))
-}
-
-/// Whether the shape is an exact sphere.
-pub(super) fn is_sphere(shape: &Shape) -> bool {
-    matches!(shape.field(), Field::Sphere(_))
+    let spacing = sphere.tree.spacing;
+    let descend = |start| minimise_distance(sphere.shape, partner, start, DESCENT.scaled(spacing));
+    let mut deepest = descend(nearest);
+    let (mut starts, mut count) = ([nearest.position; MOST_STARTS], 1);
+    let limit = nearest.distance + DEPTH_BELOW_NODES * spacing;
+    for &(_, index) in candidates.iter().filter(|(distance, _)| *distance < limit) {
+        let node = sphere.tree.nodes[index as usize].position;
+        let is_close = |start: &DVec3| start.distance(node) < START_DISTANCE * spacing;
+        if count == MOST_STARTS || starts[..count].iter().any(is_close) {
+            continue;
+        }
+        (starts[count], count) = (node, count + 1);
+        if let Some(start) = SurfacePoint::at(partner, node) {
+            let minimum = descend(start);
+            if minimum.distance < deepest.distance {
+                deepest = minimum;
+            }
+        }
+    }
+    // Of all directions in the kink between two samples, the radial one is that of the force.
+    let normal = -deepest.position.normalize_or(-deepest.normal);
+    SurfacePoint { normal, slope: deepest.slope * deepest.normal.dot(normal), ..deepest }
 }
 
 /// Limits of a descent.

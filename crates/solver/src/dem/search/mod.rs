@@ -2,8 +2,8 @@
 //! between surfaces (Eqs 7-8).
 //!
 //! Broad phase (here): bounding spheres in a cell list, with their periodic images. Narrow phase
-//! (`narrow_phase.rs`): surface nodes of each grain in the distance field of its partner, and the
-//! deepest point of the surface.
+//! (`narrow_phase.rs`): surface patches of each grain in the distance field of its partner, and the
+//! deepest point of a sphere.
 
 mod deepest_point;
 mod gap;
@@ -15,8 +15,7 @@ mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint};
-pub(super) use node_tree::NodeTree;
-pub(super) use surface::PosedShape;
+pub(super) use node_tree::{NodeTree, PosedShape};
 
 use glam::{DVec3, IVec3};
 

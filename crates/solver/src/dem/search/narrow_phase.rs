@@ -3,9 +3,10 @@
 
 use glam::DVec3;
 
-use super::deepest_point::{deepest_point_of_sphere, is_sphere};
+use super::deepest_point::deepest_point_of_sphere;
 use super::node_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_nodes};
-use super::surface::{GRADIENT_MARGIN, PartnerField, PosedShape, SurfacePoint};
+use super::node_tree::PosedShape;
+use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint, is_sphere};
 
 /// Penetrating point of a pair, space frame.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +15,8 @@ pub(in crate::dem) struct ContactPoint {
     pub id: u32,
     /// Overlap d_i [m], positive (Eq. 7).
     pub overlap: f64,
-    /// Area that the point represents [m^2].
+    /// Area that the point represents, over the mean area of the grain's nodes. The nodes of a
+    /// large grain thus count as much as those of a small one.
     pub area: f64,
     /// Lever arm from the centroid of the first grain [m].
     pub lever_arm: DVec3,
@@ -140,13 +142,14 @@ impl ContactPatch {
     ) -> (f64, Option<ClosestPoint>) {
         let (bound, closest) =
             scan_surface(owner, partner, reach, &mut self.memory[grain], &mut self.found);
+        let scale = 1.0 / (owner.tree.spacing * owner.tree.spacing);
         self.points.extend(self.found.iter().map(|found| {
             let (lever_arm, normal) = to_space(&found.point);
             let id = if grain == 0 { found.id } else { found.id | SECOND_GRAIN };
             ContactPoint {
                 id,
                 overlap: -found.point.distance,
-                area: found.area,
+                area: found.area * scale,
                 lever_arm,
                 normal,
                 slope: found.point.slope,
@@ -231,10 +234,16 @@ fn scan_surface(
         .index
         .filter(|_| nearest.distance < range)
         .and_then(|index| tree.nodes[index as usize].deepest_point(partner));
+    // On a wall the nearest patch may be another one than that of the least bound.
+    let others = memory.candidates.iter().filter(|_| reach > 0.0 && partner.is_wall());
+    let others = others.filter_map(|(_, index)| tree.nodes[*index as usize].deepest_point(partner));
+    let closest =
+        closest.into_iter().chain(others).min_by(|a, b| a.distance.total_cmp(&b.distance));
     if !is_sphere {
         return (nearest.distance / GRADIENT_MARGIN, closest);
     }
-    let deepest = closest.map(|start| deepest_point_of_sphere(owner, partner, start));
+    let deepest =
+        closest.map(|start| deepest_point_of_sphere(owner, partner, start, &memory.candidates));
     set_deepest(owner, deepest, found);
     // Half of the gap may close before the pair is searched again.
     let bound = nearest.distance - NODE_COVERAGE * tree.spacing;
@@ -247,11 +256,8 @@ fn set_deepest(
     deepest: Option<SurfacePoint>,
     found: &mut Vec<PenetratingPoint>,
 ) {
-    let area = owner.tree.spacing * owner.tree.spacing;
     found.clear();
-    found.extend(deepest.filter(|point| point.distance < 0.0).map(|point| PenetratingPoint {
-        id: DEEPEST_POINT,
-        area,
-        point,
-    }));
+    let area = owner.tree.spacing * owner.tree.spacing;
+    let deepest = deepest.filter(|point| point.distance < 0.0);
+    found.extend(deepest.map(|point| PenetratingPoint { id: DEEPEST_POINT, area, point }));
 }

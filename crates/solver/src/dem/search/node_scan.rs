@@ -106,7 +106,8 @@ fn test_node(
     found: &mut Vec<PenetratingPoint>,
 ) -> f64 {
     let patch = &tree.nodes[index as usize];
-    let distance = partner.distance_within(patch.position, reach + patch.extent) - patch.extent;
+    let extent = patch.extent_towards(partner);
+    let distance = partner.distance_within(patch.position, reach + extent) - extent;
     if distance < 0.0
         && let Some(point) = patch.deepest_point(partner)
         && point.distance < 0.0
@@ -132,16 +133,15 @@ pub(super) fn scan_nodes(
     *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestNode { distance: range, index: None };
     if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
-        nearest.update(partner.distance_within(node.position, range) - node.extent, index);
+        let extent = node.extent_towards(partner);
+        nearest.update(partner.distance_within(node.position, range + extent) - extent, index);
     }
+    let extent = if partner.is_wall() { tree.extent } else { 0.0 };
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
         // Only candidates and nodes nearer than the nearest one so far are of interest.
-        if partner.is_beyond(
-            cluster.centre,
-            cluster.radius,
-            nearest.distance.max(*slack) + tree.extent,
-        ) {
+        if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(*slack) + extent)
+        {
             cluster_index = cluster.skip as usize;
             continue;
         }

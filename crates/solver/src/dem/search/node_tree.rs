@@ -1,6 +1,6 @@
 //! Hierarchy of the surface nodes of a shape, built once for each shape.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
 use super::patches::{SurfacePatch, surface_patches};
@@ -81,6 +81,19 @@ impl NodeTree {
         }
         self.clusters[index].skip = self.clusters.len() as u32;
     }
+}
+
+/// Shape of a grain, or of a periodic image, at its pose.
+#[derive(Clone, Copy)]
+pub(in crate::dem) struct PosedShape<'a> {
+    /// Shape.
+    pub shape: &'a Shape,
+    /// Hierarchy of its surface nodes.
+    pub tree: &'a NodeTree,
+    /// Rotation from the principal frame to the space frame.
+    pub rotation: DMat3,
+    /// Centroid [m].
+    pub position: DVec3,
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use grainwake_shape::{Field, SampledField, Shape, SurfaceNode};
 
 use super::surface::{PartnerField, SurfacePoint};
 
-/// Largest height of the surface above the chord of two neighbouring points [diameters].
+/// Height of the surface above the chord of two points at their least distance [diameters].
 const SAGITTA: f64 = 8e-4;
 /// Least distance between two points [sample spacings].
 const LEAST_DISTANCE: f64 = 0.5;
@@ -36,7 +36,7 @@ pub(in crate::dem) struct SurfacePatch {
     pub position: DVec3,
     /// Area that the patch represents [m^2].
     pub area: f64,
-    /// Largest distance of a point of the patch from the middle [m]; zero for a point.
+    /// Bound of the distance of a point of the patch from the middle [m]; zero for a point.
     pub extent: f64,
     /// Outward unit normal.
     normal: DVec3,
@@ -95,8 +95,14 @@ impl SurfacePatch {
         };
         let arcs =
             [arc(cosine * u + sine * v, mean + half), arc(cosine * v - sine * u, mean - half)];
-        let [first, second] = arcs.map(|arc| arc.radius * arc.sine);
+        // The chord of an arc is longer than its sine by at most 1 %.
+        let [first, second] = arcs.map(|arc| 1.01 * arc.radius * arc.sine);
         SurfacePatch { extent: first.hypot(second), normal, arcs, ..SurfacePatch::point(node) }
+    }
+
+    /// Bound of the distance from the middle of the points that may touch `partner` [m].
+    pub(super) fn extent_towards(&self, partner: &PartnerField) -> f64 {
+        if partner.is_wall() { self.extent } else { 0.0 }
     }
 
     /// Deepest point in a wall; in a grain, whose surface is curved too, the middle of the patch.

@@ -3,22 +3,6 @@
 use glam::{DMat3, DVec3};
 use grainwake_shape::{Field, Shape};
 
-use super::deepest_point::is_sphere;
-use super::node_tree::NodeTree;
-
-/// Shape of a grain, or of a periodic image, at its pose.
-#[derive(Clone, Copy)]
-pub(in crate::dem) struct PosedShape<'a> {
-    /// Shape.
-    pub shape: &'a Shape,
-    /// Hierarchy of its surface nodes.
-    pub tree: &'a NodeTree,
-    /// Rotation from the principal frame to the space frame.
-    pub rotation: DMat3,
-    /// Centroid [m].
-    pub position: DVec3,
-}
-
 /// Safety factor on a distance from a sampled field, whose gradient may slightly exceed one.
 pub(super) const GRADIENT_MARGIN: f64 = 1.1;
 
@@ -105,6 +89,10 @@ impl<'a> PartnerField<'a> {
             }
         }
     }
+    /// Whether the partner is a wall.
+    pub fn is_wall(&self) -> bool {
+        matches!(self, PartnerField::HalfSpace { .. })
+    }
     /// Whether the partner is an exact sphere.
     pub fn is_sphere(&self) -> bool {
         matches!(self, PartnerField::Shape { shape, .. } if is_sphere(shape))
@@ -112,7 +100,7 @@ impl<'a> PartnerField<'a> {
     /// Point with the smallest distance on a sphere of `radius` [m] around the origin; `None` if
     /// the partner is neither a sphere nor a wall, or a concentric sphere.
     pub fn deepest_point_of_sphere(&self, radius: f64) -> Option<SurfacePoint> {
-        if !self.is_sphere() && !matches!(self, PartnerField::HalfSpace { .. }) {
+        if !self.is_sphere() && !self.is_wall() {
             return None;
         }
         let (_, gradient) = self.distance_and_gradient(DVec3::ZERO);
@@ -147,6 +135,11 @@ impl SurfacePoint {
         let normal = gradient.try_normalize()?;
         Some(SurfacePoint { position, distance, normal, slope: gradient.dot(normal) })
     }
+}
+
+/// Whether the shape is an exact sphere.
+pub(super) fn is_sphere(shape: &Shape) -> bool {
+    matches!(shape.field(), Field::Sphere(_))
 }
 
 /// Projection onto the surface by two Newton steps.
