@@ -210,9 +210,9 @@ fn test_4_oblique_impact_at_constant_speed() {
 fn test_5_oblique_impact_at_constant_normal_speed() {
     let (radius, mu, speed) = (1e-5, 0.3, 5.0);
     let steel = (radius, 7850.0, material(2.08e11, 0.3));
-    // Measured: 0.046. The published points at x < 5, up to 1.5 away, correspond to about half of
+    // Measured: 0.032. The published points at x < 5, up to 1.5 away, correspond to about half of
     // Mindlin's tangential stiffness. The last one is 0.053 off the exact result of sliding.
-    compare("Test5_steel", 5.5..12.0, 0.05, |x| {
+    compare("Test5_steel", 5.5..12.0, 0.035, |x| {
         let velocity = DVec3::new(x * mu * speed, 0.0, -speed);
         let ball = plane_impact(steel, mu, velocity, 0.0);
         let found = (ball.velocity.x - radius * ball.angular_velocity.y) / (mu * speed);

@@ -165,8 +165,8 @@ fn stiffness_of_an_irregular_pair_does_not_depend_on_its_nodes() {
             let of_spring = f.length() / (1e4 * depth);
             let off = (f - reference).length() / reference.length();
             println!("{nodes} nodes, {depth}: {of_spring:.4} of k delta, {off:.2e} off");
-            assert!((0.7..1.0).contains(&of_spring), "{nodes} {depth}: {of_spring}");
-            assert!(off < 0.2, "{nodes} {depth}: {off}");
+            assert!((0.74..0.9).contains(&of_spring), "{nodes} {depth}: {of_spring}");
+            assert!(off < 0.18, "{nodes} {depth}: {off}");
         }
     }
 }
@@ -534,11 +534,11 @@ fn a_collision_of_any_two_shapes_keeps_the_energy() {
     let rock = |diameter| Arc::new(rock.scaled_to_equivalent_diameter(diameter).unwrap());
     let sphere = Arc::new(Shape::sphere(0.25e-3, 2000));
     for (name, a, b, bound) in [
-        ("rock and rock", rock(0.5e-3), rock(0.5e-3), 0.01),
-        ("rock and rock of 20 times its size", rock(0.1e-3), rock(2e-3), 0.01),
+        ("rock and rock", rock(0.5e-3), rock(0.5e-3), 0.008),
+        ("rock and rock of 20 times its size", rock(0.1e-3), rock(2e-3), 0.005),
         // The deepest point of a sphere on a rough surface is searched.
-        ("sphere and rock", sphere.clone(), rock(0.5e-3), 0.06),
-        ("sphere and rock of 20 times its size", sphere, rock(10e-3), 0.06),
+        ("sphere and rock", sphere.clone(), rock(0.5e-3), 0.045),
+        ("sphere and rock of 20 times its size", sphere, rock(10e-3), 0.025),
     ] {
         let change = largest_change_of_energy(&a, &b);
         println!("{name}: energy {change:.1e}");
@@ -568,6 +568,6 @@ fn an_ellipsoid_rolls_down_a_slight_slope() {
         }
         let ratio = grains[0].velocity.x / (5.0 / 7.0 * 9.81 * s * 0.3);
         println!("ellipsoid on a slope of {degrees} degrees: {ratio:.4} of the exact speed");
-        assert!((ratio - 1.0).abs() < 0.03, "{degrees}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.015, "{degrees}: {ratio}");
     }
 }

@@ -2,13 +2,13 @@
 //! across a gap.
 //!
 //! The energy of the normal force is a function of one effective overlap D of the pair, a smooth
-//! mean of the overlaps d_i of its penetrating points with areas a_i. The contact conserves energy,
-//! and its stiffness does not depend on the number of points:
+//! mean of the overlaps d_i of its penetrating points with areas a_i, so that the contact conserves
+//! energy:
 //!
 //! ```text
 //! w_i = a_i d_i^p / sum_j a_j d_j^p      weights
 //! D   = sum_i w_i d_i                    effective overlap
-//! F_i = -F(D) dD/dd_i n_i                force at point i
+//! F_i = -F(D) dD/dd_i grad d_i           force at point i
 //! ```
 //!
 //! A single point receives Eq. 9. Dashpot and friction are shared by the weights. Friction is an
@@ -35,9 +35,9 @@ struct PatchMean {
     overlap: f64,
     /// Effective overlap D [m].
     effective_overlap: f64,
-    /// Sum of a_i d_i^p over the deepest overlap to the power of p [m^2].
+    /// Sum of a_i r_i^p, where r_i is d_i over the deepest overlap [node areas].
     total: f64,
-    /// Sum of dD/dd_i: effective overlap gained per distance that the patch moves inwards.
+    /// Effective overlap gained per distance that the patch moves inwards.
     gain: f64,
     /// Mean of the unit normals; shorter than one if they differ.
     normal: DVec3,
