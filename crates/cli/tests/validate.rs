@@ -270,6 +270,17 @@ fn a_column_that_is_not_there_is_a_missed_check() {
 }
 
 #[test]
+fn the_list_is_available_as_json() {
+    let (folder, _) = suites(SUITE);
+    let done = validate(folder.path(), &["--list", "--json"]).success();
+    let listed: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+    let run = &listed[0]["runs"][0];
+    assert_eq!(listed[0]["title"], "Free fall");
+    assert_eq!((&run["name"], &run["level"]), (&"fall".into(), &"ci".into()));
+    assert_eq!(run["quantities"][1], "acceleration");
+}
+
+#[test]
 fn the_validations_of_the_product_can_be_read() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let done = validate(&root, &["--list"]).success();

@@ -1,6 +1,7 @@
 """Grains: constructors, measures, files and refused input."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -216,6 +217,21 @@ def test_grey_images_need_a_threshold():
     assert 1 < scan.threshold < 3 and len(scan) == 1
     with pytest.raises(gw.CaseError, match='found "mean"'):
         gw.scan(image, voxel="50 um", threshold="mean")
+
+
+def test_a_stated_voxel_size_is_compared(tmp_path):
+    file = tmp_path / "ball.nrrd"
+    header = (
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 28 28 28\nspacings: 0.02 0.02 0.02\n"
+        'units: "mm" "mm" "mm"\nencoding: raw\n\n'
+    )
+    file.write_bytes(header.encode() + ball().astype(np.uint8).tobytes())
+    with pytest.warns(gw.CaseWarning, match="states voxels of 0.02 mm, unlike voxel = 5e-5 m"):
+        other = gw.Grain.from_scan(file, voxel="50 um", roundness=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        same = gw.Grain.from_scan(file, voxel="20 um", roundness=False)
+    assert other.volume == pytest.approx(2.5**3 * same.volume)
 
 
 @pytest.mark.parametrize("image, words", [

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use grainwake_shape::available_memory;
+use grainwake_solver::immersed::narrow_band_bytes;
 use grainwake_solver::sim::Setup;
 
 use crate::error::RunError;
@@ -16,7 +17,8 @@ const BYTES_PER_SURFACE_CELL: f64 = 1200.0;
 /// Bytes of a surface node with its patches and their place in the contact search.
 const BYTES_PER_NODE: f64 = 400.0;
 
-/// Returns the memory of a run: fields, forced faces of the grains, and shapes [bytes].
+/// Returns the memory of a run: fields, forced faces of the grains, shapes and the distances
+/// sampled around them [bytes].
 pub(crate) fn needed(setup: &Setup) -> u64 {
     let mesh = &setup.mesh;
     // The number of cells of an absurd box exceeds any integer.
@@ -35,6 +37,9 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
         let shape = &grain.shape;
         if seen.insert(Arc::as_ptr(shape).addr()) {
             bytes += shape.bytes() as f64 + shape.nodes().len() as f64 * BYTES_PER_NODE;
+            if setup.fluid.is_some() {
+                bytes += narrow_band_bytes(mesh, shape);
+            }
         }
     }
     bytes as u64

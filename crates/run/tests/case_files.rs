@@ -786,6 +786,25 @@ fn a_fixed_step_is_compared_with_the_velocities_at_the_start() {
 }
 
 #[test]
+fn few_substeps_are_warned_of_for_grains_that_may_be_flat() {
+    let dropped = |shape: &str, substeps: u32| {
+        warnings(&format!(
+            "[domain]\nsize = [\"50 mm\", \"50 mm\", \"50 mm\"]\n[contact]\n\
+             substeps_per_contact = {substeps}\n[time]\nend = \"1 s\"\n[[grain]]\nshape = {shape}\n\
+             density = 2500\nposition = [\"25 mm\", \"25 mm\", \"25 mm\"]\n"
+        ))
+    };
+    let plate =
+        "{ kind = \"rounded-box\", size = [\"8 mm\", \"5 mm\", \"1 mm\"], radius = \"0.3 mm\" }";
+    let few = dropped(plate, 11);
+    assert!(few.contains("11 sub-steps per contact are unstable for flat faces"), "{few}");
+    assert!(few.contains("substeps_per_contact of 12 or more"), "{few}");
+    assert!(!dropped(plate, 12).contains("sub-steps per contact"));
+    let sphere = "{ kind = \"sphere\", diameter = \"2 mm\" }";
+    assert!(!dropped(sphere, 5).contains("sub-steps per contact"));
+}
+
+#[test]
 fn contact_that_dominates_names_its_levers() {
     let heap = "[domain]\nsize = [\"50 mm\", \"50 mm\", \"200 mm\"]\n[contact]\nstiffness = \"1 MN/m\"\n\
                 [time]\nend = \"2 s\"\n[[packing]]\ncount = 500\ndensity = 2650\nnodes = 1000\n\

@@ -15,8 +15,8 @@ use glam::DVec3;
 /// Resolution, surface nodes and bounds of a sampled shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeOptions {
-    /// Grid cells across the longest extent. Scans lower the default for small grains.
-    pub cells: usize,
+    /// Grid cells across the longest extent; `None` for 56, fewer for the small grains of a scan.
+    pub cells: Option<usize>,
     /// Minimum number of grid cells across the shortest extent; refines the grid of flat grains.
     pub least_cells: usize,
     /// Number of surface nodes; `None` for about one per (equivalent diameter / 20)^2 of surface.
@@ -27,10 +27,13 @@ pub struct ShapeOptions {
     pub bounds: QualityBounds,
 }
 
+/// Default number of grid cells across the longest extent.
+pub(crate) const DEFAULT_CELLS: usize = 56;
+
 impl Default for ShapeOptions {
     fn default() -> ShapeOptions {
         ShapeOptions {
-            cells: 56,
+            cells: None,
             least_cells: 16,
             nodes: None,
             roundness: true,
@@ -63,7 +66,8 @@ pub(crate) struct Body<D> {
 
 impl ShapeOptions {
     fn spacing(&self, extent: DVec3) -> Result<f64> {
-        for (name, value) in [("cells", self.cells), ("least_cells", self.least_cells)] {
+        let cells = self.cells.unwrap_or(DEFAULT_CELLS);
+        for (name, value) in [("cells", cells), ("least_cells", self.least_cells)] {
             within(name, value as f64, 8.0..=1024.0, "must be 8 to 1024")?;
         }
         if let Some(nodes) = self.nodes {
@@ -71,7 +75,7 @@ impl ShapeOptions {
         }
         positive("shortest extent of the body", extent.min_element())?;
         size("longest extent of the body", extent.max_element())?;
-        Ok((extent.max_element() / self.cells as f64)
+        Ok((extent.max_element() / cells as f64)
             .min(extent.min_element() / self.least_cells as f64))
     }
 }

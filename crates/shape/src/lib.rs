@@ -20,7 +20,7 @@
 //! ```
 //! use grainwake_shape::{Shape, ShapeOptions, analytic};
 //! # fn main() -> grainwake_shape::Result<()> {
-//! let options = ShapeOptions { cells: 32, ..ShapeOptions::default() };
+//! let options = ShapeOptions { cells: Some(32), ..ShapeOptions::default() };
 //! let pebble = analytic::ellipsoid(1.5e-3, 1.0e-3, 0.5e-3, &options)?;
 //!
 //! // Signed distance and outward normal 0.1 mm outside the end of the long axis.

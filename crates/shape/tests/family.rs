@@ -64,7 +64,7 @@ fn the_studys_grains_are_what_their_place_in_the_chart_says() {
 #[test]
 fn equal_targets_and_seeds_give_equal_grains_and_other_seeds_others() {
     let options =
-        ShapeOptions { cells: 24, least_cells: 12, nodes: Some(200), ..Default::default() };
+        ShapeOptions { cells: Some(24), least_cells: 12, nodes: Some(200), ..Default::default() };
     let target = FamilyTarget::new(0.7, 0.5, 1e-3);
     let one = family_grain(&target, 7, &options).unwrap();
     assert_eq!(one.digest(), family_grain(&target, 7, &options).unwrap().digest());
@@ -74,7 +74,7 @@ fn equal_targets_and_seeds_give_equal_grains_and_other_seeds_others() {
 #[test]
 fn targets_at_the_edge_of_the_chart_are_met_or_refused() {
     let options =
-        ShapeOptions { cells: 40, least_cells: 20, nodes: Some(300), ..Default::default() };
+        ShapeOptions { cells: Some(40), least_cells: 20, nodes: Some(300), ..Default::default() };
     for (sphericity, roundness, flatness) in
         [(0.3, 0.3, 1.0), (0.5, 0.9, 0.4), (0.95, 0.3, 0.9), (0.97, 0.9, 1.0)]
     {

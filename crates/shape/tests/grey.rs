@@ -66,7 +66,7 @@ fn both(axes: DVec3, turn: DQuat, off: DVec3, [blur, noise]: [f64; 2], seed: u64
             sub_voxel,
             largest_piece: true,
             shape: ShapeOptions {
-                cells: 28,
+                cells: Some(28),
                 nodes: Some(250),
                 roundness: false,
                 ..Default::default()

@@ -132,7 +132,7 @@ impl Folder {
 }
 
 fn options() -> MeshOptions {
-    let shape = ShapeOptions { cells: 32, nodes: Some(400), ..Default::default() };
+    let shape = ShapeOptions { cells: Some(32), nodes: Some(400), ..Default::default() };
     MeshOptions { shape, flip: false }
 }
 
@@ -411,7 +411,7 @@ fn check_nodes(shape: &Shape) {
 
 #[test]
 fn nodes_and_surface_meshes_of_simple_bodies() {
-    let options = ShapeOptions { cells: 32, ..Default::default() };
+    let options = ShapeOptions { cells: Some(32), ..Default::default() };
     let bodies = [
         analytic::ellipsoid(1.0, 1.0, 1.0, &options).unwrap(),
         analytic::rounded_box(2.0, 1.5, 1.0, 0.1, &options).unwrap(),
@@ -564,8 +564,12 @@ fn a_regular_tetrahedron_is_accepted_for_any_position_of_its_tips() {
     let triangles = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
     let mesh = TriangleMesh { vertices, triangles };
     for cells in [33, 40, 48, 56, 77, 100] {
-        let shape =
-            ShapeOptions { cells, nodes: Some(200), roundness: false, ..Default::default() };
+        let shape = ShapeOptions {
+            cells: Some(cells),
+            nodes: Some(200),
+            roundness: false,
+            ..Default::default()
+        };
         let options = MeshOptions { shape, flip: false };
         let shape = shape_from_mesh(&mesh, &SourceFile::default(), &options).unwrap();
         println!("{cells}: {:+.5}", shape.volume() / (8.0 / 3.0) - 1.0);

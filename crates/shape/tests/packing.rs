@@ -14,7 +14,7 @@ use std::collections::HashMap;
 /// Irregular grains of equal volume, from rods to balls, sharp to round.
 fn grains() -> Vec<Shape> {
     let options = ShapeOptions {
-        cells: 24,
+        cells: Some(24),
         least_cells: 12,
         nodes: Some(150),
         roundness: false,
@@ -172,7 +172,12 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
         threshold: Some(Threshold::Otsu),
         median: true,
         separate: Some(0.87),
-        shape: ShapeOptions { cells: 16, nodes: Some(60), roundness: false, ..Default::default() },
+        shape: ShapeOptions {
+            cells: Some(16),
+            nodes: Some(60),
+            roundness: false,
+            ..Default::default()
+        },
         ..ScanOptions::new(1.0)
     };
     // All labels, the shape of one grain only: shapes take longest.

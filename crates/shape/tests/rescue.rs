@@ -12,7 +12,7 @@ use render::{Noise, blurred, greys, shares};
 use std::f64::consts::PI;
 
 fn options() -> ScanOptions {
-    let shape = ShapeOptions { cells: 32, roundness: false, ..Default::default() };
+    let shape = ShapeOptions { cells: Some(32), roundness: false, ..Default::default() };
     ScanOptions { shape, ..ScanOptions::new(1.0) }
 }
 

@@ -21,7 +21,7 @@ fn measured(
         threshold: Some(Threshold::Otsu),
         median: true,
         separate: Some(0.87),
-        shape: ShapeOptions { cells: 24, nodes: Some(60), ..Default::default() },
+        shape: ShapeOptions { cells: Some(24), nodes: Some(60), ..Default::default() },
         ..ScanOptions::new(1.0)
     };
     let grains = shapes_from_volume(&volume, &SourceFile::default(), &options).unwrap();

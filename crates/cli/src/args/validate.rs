@@ -40,7 +40,7 @@ pub struct ValidateArgs {
     /// Print the table, warnings and errors only
     #[arg(long)]
     pub quiet: bool,
-    /// Print the results as a JSON list; other messages go to standard error
+    /// Print the results, or the list of --list, as JSON; other messages go to standard error
     #[arg(long)]
     pub json: bool,
 }

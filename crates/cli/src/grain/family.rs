@@ -17,7 +17,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     let diameter = length("--equivalent-diameter", &args.equivalent_diameter)?;
     let mut options = family_options();
     options.nodes = args.common.nodes;
-    options.cells = args.common.cells.unwrap_or(options.cells);
+    options.cells = args.common.cells.or(options.cells);
     let count = args.sphericity.len() * args.roundness.len();
     if count > 999 {
         return Err(Exit::new(

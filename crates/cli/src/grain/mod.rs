@@ -84,11 +84,8 @@ fn diameter(new: &NewGrain) -> Result<Option<f64>, Exit> {
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {
-    let mut options = ShapeOptions { nodes: new.common.nodes, ..ShapeOptions::default() };
-    if let Some(cells) = new.common.cells {
-        options.cells = cells;
-    }
-    options
+    let common = &new.common;
+    ShapeOptions { cells: common.cells, nodes: common.nodes, ..ShapeOptions::default() }
 }
 
 /// Refuses to replace a file without `--force`, and a file that cannot be created. Called before

@@ -50,7 +50,11 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         _ => Level::Ci,
     };
     if args.list {
-        return print(&listing(&suites));
+        return print(&if args.json {
+            serde_json::to_string_pretty(&listed(&suites))?
+        } else {
+            listing(&suites)
+        });
     }
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
@@ -215,6 +219,20 @@ fn execute(
         Err(error @ RunError::Unstable { .. }) => Ok(Err(error.to_string())),
         Err(error) => Err(error.into()),
     }
+}
+
+/// Returns the suites with their runs and quantities as JSON. The names are stable.
+fn listed(suites: &[Suite]) -> serde_json::Value {
+    let run = |run: &SuiteRun| {
+        let level = if run.level == Level::Full { "full" } else { "ci" };
+        let quantities: Vec<&str> = run.checks.iter().map(|c| c.quantity.as_str()).collect();
+        serde_json::json!({ "name": run.name, "level": level, "quantities": quantities })
+    };
+    let suite = |suite: &Suite| {
+        let runs: Vec<_> = suite.runs.iter().map(run).collect();
+        serde_json::json!({ "name": suite.name, "title": suite.title, "runs": runs })
+    };
+    suites.iter().map(suite).collect()
 }
 
 /// Lists the suites with their runs and quantities.

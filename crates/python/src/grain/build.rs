@@ -23,9 +23,8 @@ const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
 
 /// Returns the options of the resolution.
 pub(super) fn options(cells: Option<Whole>, nodes: Option<Whole>) -> ShapeOptions {
-    let mut options = ShapeOptions { nodes: nodes.map(usize::from), ..ShapeOptions::default() };
-    options.cells = cells.map_or(options.cells, usize::from);
-    options
+    let [cells, nodes] = [cells, nodes].map(|count| count.map(usize::from));
+    ShapeOptions { cells, nodes, ..ShapeOptions::default() }
 }
 
 /// Rescales a shape on request; without it refuses an implausible size, which indicates a wrong
@@ -313,7 +312,7 @@ impl PyGrain {
             .map_or(Ok(2e-3), |value| quantity::<Length>("equivalent_diameter", value))?;
         let mut how = family_options();
         how.nodes = nodes.map(usize::from);
-        how.cells = cells.map_or(how.cells, usize::from);
+        how.cells = cells.map(usize::from).or(how.cells);
         let mut target = FamilyTarget::new(sphericity, roundness, diameter);
         target.flatness = flatness.unwrap_or(target.flatness);
         py.detach(|| family_grain(&target, seed, &how)).raise().map(PyGrain::new)

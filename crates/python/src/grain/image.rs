@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use grainwake_run::case::quantity::Length;
-use grainwake_shape::scan::{Scan, ScanOptions, Threshold, Voxels, read_volume, scan_volume};
+use grainwake_shape::scan::{
+    Scan, ScanOptions, Threshold, Voxels, read_volume_and_voxel, scan_volume,
+};
 use grainwake_shape::{ReadLimits, ShapeError};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
@@ -15,7 +17,7 @@ use super::PyGrain;
 use super::build::{options, sized};
 use super::volume;
 use crate::arguments::{Whole, quantity};
-use crate::error::{IntoException, Raise, input};
+use crate::error::{IntoException, Raise, input, warn};
 
 /// Grains of a 3-D image, by label.
 #[pyclass(module = "grainwake", name = "Scan", frozen)]
@@ -118,7 +120,7 @@ impl PyGrain {
     ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
     ///     booleans are labels with 0 for background, floating numbers are grey values.
     /// voxel : float or str
-    ///     Edge length of a voxel [m].
+    ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`.
     /// label : int, optional
     ///     Label of a single grain.
     /// threshold : float or {"otsu", "otsu3"}, optional
@@ -223,7 +225,7 @@ impl PyGrain {
 ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
 ///     booleans are labels with 0 for background, floating numbers are grey values.
 /// voxel : float or str
-///     Edge length of a voxel [m].
+///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`.
 /// label : int, optional
 ///     Label of a single grain.
 /// threshold : float or {"otsu", "otsu3"}, optional
@@ -341,11 +343,21 @@ fn read(
     let how = given.options(voxel, threshold.map(segmentation).transpose()?);
     let quiet = |_: &str, _: u64, _: u64| {};
     let scanned = if let Ok(path) = image.extract::<PathBuf>() {
-        py.detach(|| {
-            let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
-            let (volume, source) = read_volume(&path, &limits)?;
-            scan_volume(&volume, &source, &how, &quiet)
-        })
+        let (volume, source, stated) = py
+            .detach(|| {
+                let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
+                read_volume_and_voxel(&path, &limits)
+            })
+            .raise()?;
+        let other = stated.filter(|stated| stated.contradicts(voxel)).map(|stated| {
+            let file = path.display();
+            format!(
+                "{file} states voxels of {stated}, unlike voxel = {voxel:e} m; the grains have the \
+                 size of voxel"
+            )
+        });
+        warn(py, other)?;
+        py.detach(|| scan_volume(&volume, &source, &how, &quiet))
     } else {
         let volume = volume::volume(image)?;
         py.detach(|| {

@@ -147,7 +147,7 @@ mod tests {
     use crate::Field;
 
     fn options() -> ShapeOptions {
-        ShapeOptions { cells: 40, nodes: Some(300), ..Default::default() }
+        ShapeOptions { cells: Some(40), nodes: Some(300), ..Default::default() }
     }
 
     #[track_caller]
@@ -222,7 +222,7 @@ mod tests {
         assert!(rounded_box(1.0, 1.0, 1.0, f64::NAN, &o).is_err());
         assert!(superquadric([1.0; 3], 0.01, 1.0, &o).is_err());
         assert!(rounded_box(1.0, 1.0, 1e-9, 0.0, &o).is_err());
-        let few = ShapeOptions { cells: 2, ..Default::default() };
+        let few = ShapeOptions { cells: Some(2), ..Default::default() };
         assert!(cylinder(1.0, 1.0, &few).is_err());
     }
 }

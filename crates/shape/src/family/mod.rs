@@ -62,7 +62,7 @@ impl FamilyTarget {
 /// Returns the resolution that resolves edges of low roundness: 22 cells across the shortest
 /// extent.
 pub fn family_options() -> ShapeOptions {
-    ShapeOptions { cells: 48, least_cells: 22, ..ShapeOptions::default() }
+    ShapeOptions { cells: Some(48), least_cells: 22, ..ShapeOptions::default() }
 }
 
 /// Attempts with other random faces before the search fails.

@@ -7,7 +7,7 @@ use crate::{ShapeOptions, analytic};
 const HEAD: usize = 8 + 4 + 8;
 
 fn egg() -> Shape {
-    let options = ShapeOptions { cells: 16, nodes: Some(100), ..Default::default() };
+    let options = ShapeOptions { cells: Some(16), nodes: Some(100), ..Default::default() };
     analytic::ellipsoid(2e-3, 1.5e-3, 1e-3, &options).unwrap()
 }
 

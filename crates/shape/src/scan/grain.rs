@@ -5,7 +5,7 @@ use super::regions::{Region, crop, cuts};
 use super::segments::Segments;
 use super::threshold::median;
 use super::{Mask, ScanOptions, smooth, transform};
-use crate::assemble::ShapeOptions;
+use crate::assemble::DEFAULT_CELLS;
 use crate::error::{Defect, Result, ShapeError, first_few};
 use crate::filter::refine;
 use crate::grid::{coordinates, index, place};
@@ -119,10 +119,8 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     provenance.source.clone_from(&source.name);
     provenance.source_sha256.clone_from(&source.sha256);
     let mut finish = options.shape.clone();
-    if finish.cells == ShapeOptions::default().cells {
-        let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
-        finish.cells = finish.cells.min(enough);
-    }
+    let enough = ((CELLS.0 * longest as f64).ceil() as usize).max(CELLS.1);
+    finish.cells.get_or_insert(enough.min(DEFAULT_CELLS));
     let places = cuts(dims, labels, label, region);
     let surface = Surface::Scanned {
         image: image.map(|(weight, deviation)| (weight, options.voxel * deviation)),

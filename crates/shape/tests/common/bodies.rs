@@ -228,7 +228,7 @@ impl Scan {
     /// Builds a coarse shape of the scan; `noise` is relative to the contrast.
     pub fn shape(&self, noise: f64, seed: u64, from_mask: bool) -> Shape {
         let options = ShapeOptions {
-            cells: 24,
+            cells: Some(24),
             nodes: Some(60),
             // The roundness comes from the finer surface of the scan.
             bounds: QualityBounds { gradient_error: 1.0, volume_error: 1.0 },

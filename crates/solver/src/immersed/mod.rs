@@ -56,6 +56,7 @@ mod shared_faces;
 mod tests;
 mod update;
 
+pub use geometry::narrow_band_bytes;
 pub(crate) use open_sides::{Crossing, OpenSides};
 pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidityInput};

@@ -2,6 +2,7 @@
 
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
 use crate::number_format::number;
+use grainwake_shape::Field;
 use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::Setup;
@@ -13,6 +14,22 @@ const WARNED_OVERLAP: f64 = 0.05;
 const UNBALANCED: f64 = 3.0;
 /// Time over which the contact forces at the start act [s]; the grains hardly move.
 const MOMENT: f64 = 1e-12;
+
+/// Sub-steps per contact below which a flat grain on a wall never rests, `results/flat-grains`.
+const STABLE_SUBSTEPS: f64 = 12.0;
+
+/// Sub-steps that are too long for a flat grain, which resists tilting more than a push.
+pub(super) fn long_substeps(setup: &Setup) -> Option<String> {
+    let is_sphere = |grain: &Grain| matches!(grain.shape.field(), Field::Sphere(_));
+    let may_be_flat = setup.grains.iter().any(|grain| is_free(grain) && !is_sphere(grain));
+    let substeps = setup.contact.substeps_per_contact;
+    (may_be_flat && substeps < STABLE_SUBSTEPS).then(|| {
+        format!(
+            "{} sub-steps per contact are unstable for flat faces, which never come to rest: take [contact] substeps_per_contact of {STABLE_SUBSTEPS} or more",
+            number(substeps)
+        )
+    })
+}
 
 /// Contacts at the start that do not carry the weight: the stiffness is not that of the run in
 /// which the grains settled.

@@ -30,6 +30,7 @@ pub(super) fn warnings(
     let mut found = wrong_units(setup, e);
     found.extend(resolution::resolution_and_cost(setup, e));
     found.extend(contact::deep_impacts(setup));
+    found.extend(contact::long_substeps(setup));
     found.extend(contact::start_out_of_balance(setup));
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));

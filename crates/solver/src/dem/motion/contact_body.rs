@@ -15,7 +15,7 @@ use crate::dem::contact::{
 use crate::dem::enclosure::{Enclosure, PairKey, Partner, Side};
 use crate::dem::grain::{Grain, MotionConstraint};
 use crate::dem::material::Material;
-use crate::dem::search::{NodeTree, PosedShape};
+use crate::dem::search::{PatchTree, PosedShape};
 use crate::math::{Load, RigidVelocity};
 
 /// Safety factor on the motion that reduces the known separation of a pair.
@@ -25,7 +25,7 @@ const MOTION_MARGIN: f64 = 1.01;
 #[derive(Clone, Debug)]
 pub(super) struct ContactBody {
     shape: Arc<Shape>,
-    tree: Arc<NodeTree>,
+    tree: Arc<PatchTree>,
     material: Material,
     contact_material: ContactMaterial,
     rotation: DMat3,
@@ -79,19 +79,19 @@ impl ContactBody {
     }
 
     /// Trees of the shapes of `grains`, those of new shapes built in parallel.
-    fn trees(bodies: &[ContactBody], grains: &[Grain]) -> HashMap<*const Shape, Arc<NodeTree>> {
+    fn trees(bodies: &[ContactBody], grains: &[Grain]) -> HashMap<*const Shape, Arc<PatchTree>> {
         let known = bodies.iter().map(|body| (Arc::as_ptr(&body.shape), body.tree.clone()));
         let mut trees: HashMap<_, _> = known.collect();
         let mut new: Vec<&Arc<Shape>> = grains.iter().map(|grain| &grain.shape).collect();
         new.retain(|shape| !trees.contains_key(&Arc::as_ptr(shape)));
         new.sort_by_key(|shape| Arc::as_ptr(shape));
         new.dedup_by_key(|shape| Arc::as_ptr(shape));
-        let built: Vec<_> = new.par_iter().map(|shape| Arc::new(NodeTree::new(shape))).collect();
+        let built: Vec<_> = new.par_iter().map(|shape| Arc::new(PatchTree::new(shape))).collect();
         trees.extend(new.iter().map(|shape| Arc::as_ptr(shape)).zip(built));
         trees
     }
 
-    fn new(grain: &Grain, tree: Arc<NodeTree>) -> ContactBody {
+    fn new(grain: &Grain, tree: Arc<PatchTree>) -> ContactBody {
         ContactBody {
             shape: grain.shape.clone(),
             tree,

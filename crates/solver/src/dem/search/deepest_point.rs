@@ -4,7 +4,7 @@
 use glam::{DMat2, DVec2, DVec3};
 use grainwake_shape::Shape;
 
-use super::node_tree::PosedShape;
+use super::patch_tree::PosedShape;
 use super::surface::{PartnerField, SurfacePoint, is_sphere, project_to_surface};
 
 /// First and last radius of the compass search [node spacings].
@@ -34,7 +34,7 @@ pub(super) fn deepest_point_of_sphere(
     let (mut starts, mut count) = ([nearest.position; MOST_STARTS], 1);
     let limit = nearest.distance + DEPTH_BELOW_NODES * spacing;
     for &(_, index) in candidates.iter().filter(|(distance, _)| *distance < limit) {
-        let node = sphere.tree.nodes[index as usize].position;
+        let node = sphere.tree.patches[index as usize].position;
         let is_close = |start: &DVec3| start.distance(node) < START_DISTANCE * spacing;
         if count == MOST_STARTS || starts[..count].iter().any(is_close) {
             continue;

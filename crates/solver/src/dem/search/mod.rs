@@ -8,14 +8,14 @@
 mod deepest_point;
 mod gap;
 mod narrow_phase;
-mod node_scan;
-mod node_tree;
+mod patch_scan;
+mod patch_tree;
 mod patches;
 mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint};
-pub(super) use node_tree::{NodeTree, PosedShape};
+pub(super) use patch_tree::{PatchTree, PosedShape};
 
 use glam::{DVec3, IVec3};
 

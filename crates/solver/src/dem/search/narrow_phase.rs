@@ -1,17 +1,17 @@
-//! Narrow phase: contact patch of a pair, from the surface nodes of each grain in the distance
-//! field of its partner (Eqs 7-8). A sphere touches at its deepest point.
+//! Narrow phase: contact patch of a pair, from the surface patches of each grain in the
+//! distance field of its partner (Eqs 7-8). A sphere touches at its deepest point.
 
 use glam::DVec3;
 
 use super::deepest_point::deepest_point_of_sphere;
-use super::node_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_nodes};
-use super::node_tree::PosedShape;
+use super::patch_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_patches};
+use super::patch_tree::PosedShape;
 use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint, is_sphere};
 
 /// Penetrating point of a pair, space frame.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct ContactPoint {
-    /// Identifier of the node or point; ascending within a pair.
+    /// Identifier of the patch; ascending within a pair.
     pub id: u32,
     /// Overlap d_i [m], positive (Eq. 7).
     pub overlap: f64,
@@ -162,17 +162,17 @@ impl ContactPatch {
         (bound, closest)
     }
 
-    /// Reduces the areas of the nodes that touch a sphere, which `is_node` selects, where they
+    /// Reduces the areas of the patches that touch a sphere, which `is_patch` selects, where they
     /// belong to the contact of the sphere's own point: the sphere would roll over them as over
-    /// bumps. Nodes with other normals, as in a groove, keep their areas.
+    /// bumps. Patches with other normals, as in a groove, keep their areas.
     fn keep_other_normals(
         &mut self,
         of_sphere: Option<ClosestPoint>,
-        is_node: impl Fn(u32) -> bool,
+        is_patch: impl Fn(u32) -> bool,
     ) {
         let Some(of_sphere) = of_sphere else { return };
         let [same, other] = PATCH_ANGLES.map(f64::cos);
-        for point in self.points.iter_mut().filter(|point| is_node(point.id)) {
+        for point in self.points.iter_mut().filter(|point| is_patch(point.id)) {
             let cosine = point.normal.dot(of_sphere.normal);
             point.area *= ((same - cosine) / (same - other)).clamp(0.0, 1.0);
         }
@@ -180,24 +180,25 @@ impl ContactPatch {
     }
 
     /// Sets the separation after a search that found the closest point, if near; returns that point
-    /// if it is nearer than `reach` [m]. `node_bound` is the lower bound that the nodes give [m].
+    /// if it is nearer than `reach` [m]. `patch_bound` is the lower bound that the patches give
+    /// [m].
     fn finish(
         &mut self,
         closest: Option<ClosestPoint>,
-        node_bound: f64,
+        patch_bound: f64,
         reach: f64,
     ) -> Option<ClosestPoint> {
-        self.separation = if self.points.is_empty() { node_bound - reach } else { 0.0 };
+        self.separation = if self.points.is_empty() { patch_bound - reach } else { 0.0 };
         closest.filter(|point| point.gap < reach)
     }
 }
 
 /// Bit that marks the points of the second grain in a point identifier.
 const SECOND_GRAIN: u32 = 1 << 31;
-/// Identifier of the deepest point of a sphere, which is not a node.
+/// Identifier of the deepest point of a sphere, which is no patch.
 const DEEPEST_POINT: u32 = SECOND_GRAIN - 1;
 
-/// Range of the search for the nearest node [node spacings]; bounds the separation of the pair.
+/// Range of the search for the nearest patch [node spacings]; bounds the separation of the pair.
 const SEARCH_RANGE: f64 = 3.0;
 /// Largest distance of a point of a sphere from the nearest node [node spacings].
 const NODE_COVERAGE: f64 = 1.2;
@@ -207,7 +208,7 @@ const NODE_COVERAGE: f64 = 1.2;
 const PATCH_ANGLES: [f64; 2] = [0.35, 0.7];
 
 /// Tests the surface of `owner` in the field of its partner (Eq. 7): a sphere at its deepest point,
-/// other shapes at their nodes. Penetrating points go to `found` in ascending identifier.
+/// other shapes at their patches. Penetrating points go to `found` in ascending identifier.
 ///
 /// Returns a lower bound of the distance between surface and partner [m], and the closest point of
 /// the surface if it may be nearer than `reach` [m]. `memory` is that of the last search in the
@@ -228,15 +229,16 @@ fn scan_surface(
     }
     let range = NODE_COVERAGE * tree.spacing + reach;
     let nearest = scan_candidates(tree, partner, memory, found)
-        .unwrap_or_else(|| scan_nodes(tree, partner, SEARCH_RANGE * range, memory, found));
+        .unwrap_or_else(|| scan_patches(tree, partner, SEARCH_RANGE * range, memory, found));
     memory.nearest = nearest.index;
     let closest = nearest
         .index
         .filter(|_| nearest.distance < range)
-        .and_then(|index| tree.nodes[index as usize].deepest_point(partner));
+        .and_then(|index| tree.patches[index as usize].deepest_point(partner));
     // On a wall the nearest patch may be another one than that of the least bound.
     let others = memory.candidates.iter().filter(|_| reach > 0.0 && partner.is_wall());
-    let others = others.filter_map(|(_, index)| tree.nodes[*index as usize].deepest_point(partner));
+    let others =
+        others.filter_map(|(_, index)| tree.patches[*index as usize].deepest_point(partner));
     let closest =
         closest.into_iter().chain(others).min_by(|a, b| a.distance.total_cmp(&b.distance));
     if !is_sphere {

@@ -15,6 +15,7 @@ pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
 pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
 
 use glam::{DMat3, DVec3};
+use grainwake_shape::Shape;
 
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::flow::Boundaries;
@@ -23,6 +24,7 @@ use aperture::forcing_reach;
 use distances::{DistanceScratch, FillLists};
 use grainwake_simd::dispatch;
 use lists::UnknownFaces;
+use samples::BandSamples;
 
 /// Buffers of one thread.
 #[derive(Default)]
@@ -36,6 +38,20 @@ pub struct LocateScratch {
 /// depends more on where the grid lies; a wider one smooths thin boundary layers
 /// (`docs/decisions/0018-pressure-weight.md`).
 const BAND_HALF_WIDTH: f64 = 1.25;
+
+/// Half-width of the band around a surface, and distance up to which a grain affects faces [m].
+fn half_width_and_reach(mesh: &Mesh) -> [f64; 2] {
+    let spacings: Vec<f64> = mesh.resolved_axes().map(|axis| mesh.spacing[axis]).collect();
+    let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
+    // Half a link along the axis of the largest spacing beyond the reach of the forcing.
+    [eps, forcing_reach(eps) + 0.5 * spacings.into_iter().fold(0.0, f64::max)]
+}
+
+/// Expected memory of the distances sampled around the surface of a shape on a grid [bytes].
+/// Grains of one shape share them.
+pub fn narrow_band_bytes(mesh: &Mesh, shape: &Shape) -> f64 {
+    BandSamples::expected_bytes(shape, half_width_and_reach(mesh))
+}
 
 /// Geometry of all grains on one grid.
 pub struct Locator {
@@ -52,17 +68,13 @@ pub struct Locator {
 impl Locator {
     /// Samples the shapes of `grains` for a grid.
     pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
-        let axes = mesh.resolved_axes();
-        let spacings: Vec<f64> = axes.map(|axis| mesh.spacing[axis]).collect();
-        let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
-        // Half a link along the axis of the largest spacing beyond the reach of the forcing.
-        let reach = forcing_reach(eps) + 0.5 * spacings.iter().copied().fold(0.0, f64::max);
+        let [eps, reach] = half_width_and_reach(mesh);
         Locator {
             mesh: *mesh,
             unknown_faces: UnknownFaces::new(mesh, boundaries),
             eps,
             reach,
-            shapes: NarrowBandShapes::new(grains, [eps, reach], spacings.len()),
+            shapes: NarrowBandShapes::new(grains, [eps, reach], mesh.resolved_axes().count()),
             neighbours: NeighbourSearch::default(),
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 use rayon::prelude::*;
 
@@ -51,14 +52,17 @@ impl NarrowBandShapes {
     }
 }
 
+/// Spacing of the samples of a shape [m]; `eps` [m] is the half-width of the band.
+fn sample_spacing(shape: &Shape, eps: f64) -> f64 {
+    let thickness = (shape.upper() - shape.lower()).min_element();
+    (eps / SAMPLES_PER_BAND).min(thickness / SAMPLES_ACROSS).max(eps / MAX_SAMPLES_PER_BAND)
+}
+
 impl NarrowBandShape {
     pub fn new(shape: &Arc<Shape>, eps: f64, reach: f64, variance: f64) -> NarrowBandShape {
         let samples = match shape.field() {
             Field::Sampled(_) => {
-                let thickness = (shape.upper() - shape.lower()).min_element();
-                let spacing = (eps / SAMPLES_PER_BAND)
-                    .min(thickness / SAMPLES_ACROSS)
-                    .max(eps / MAX_SAMPLES_PER_BAND);
+                let spacing = sample_spacing(shape, eps);
                 // Doubled until single precision represents the indices of all samples.
                 let mut spacings = (0..20).map(|n| spacing * f64::from(1 << n));
                 let field = spacings.find_map(|spacing| {
@@ -74,6 +78,24 @@ impl NarrowBandShape {
 }
 
 impl BandSamples {
+    /// Expected memory of the samples of a shape up to `reach` [m] from its surface [bytes].
+    pub fn expected_bytes(shape: &Shape, [eps, reach]: [f64; 2]) -> f64 {
+        let Field::Sampled(own) = shape.field() else {
+            return 0.0;
+        };
+        let spacing = sample_spacing(shape, eps);
+        let size = shape.upper() - shape.lower() + 2.0 * (reach + spacing);
+        let across = if own.spacing() < 0.9 * spacing {
+            size / spacing + 1.5
+        } else {
+            // A coarser shape keeps its own samples, and gets more around them.
+            let own_size = DVec3::from_array(own.dims().map(|n| n as f64));
+            (size / own.spacing() + 1.5).max(own_size)
+        };
+        let count = across.element_product().min(MAX_SINGLE_INDEX as f64);
+        2.0 * size_of::<f32>() as f64 * count
+    }
+
     /// Samples with the mean distances over a kernel of the given `variance` [m^2]: the mean of six
     /// samples around a sample has the variance of their distance squared over 3.
     pub fn new(distances: SampledField, variance: f64) -> BandSamples {
@@ -94,5 +116,30 @@ impl BandSamples {
         };
         let mean_excess = (0..levels.len()).map(mean_excess).collect();
         BandSamples { distances, mean_excess }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grainwake_shape::{ShapeOptions, analytic};
+
+    #[test]
+    fn the_expected_memory_of_the_samples_is_theirs() {
+        let options = ShapeOptions::default();
+        let shapes = [
+            analytic::ellipsoid(1.0, 0.8, 0.7, &options),
+            analytic::rounded_box(1.0, 0.6, 0.1, 0.02, &options),
+            analytic::sphere(1.0, &options),
+        ];
+        for shape in shapes.map(|shape| Arc::new(shape.unwrap())) {
+            for eps in [0.02, 0.12, 0.3] {
+                let reach = 2.5 * eps;
+                let band = NarrowBandShape::new(&shape, eps, reach, band_variance(eps));
+                let held = NarrowBandShapes { shapes: vec![band] }.bytes() as f64;
+                let expected = BandSamples::expected_bytes(&shape, [eps, reach]);
+                assert!((expected - held).abs() <= 0.02 * held, "{expected} for {held}, eps {eps}");
+            }
+        }
     }
 }

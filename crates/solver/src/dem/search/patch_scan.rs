@@ -1,18 +1,19 @@
-//! Nodes of one grain that penetrate its partner, and the nearest node: by the hierarchy of the
-//! nodes, or within a step by the candidates of the last search.
+//! Patches of one grain that penetrate its partner, and the nearest patch: by the hierarchy of the
+//! patches, or within a step by the candidates of the last search.
 
-use super::node_tree::NodeTree;
+use super::patch_tree::PatchTree;
 use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint};
 
-/// Distance from the partner up to which nodes are candidates of the next searches [node spacings].
+/// Distance from the partner up to which patches are candidates of the next searches [node
+/// spacings].
 const CANDIDATE_RANGE: f64 = 0.5;
 
 /// Penetrating point in the principal frame of the grain on whose surface it lies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenetratingPoint {
-    /// Identifier of the node or point.
+    /// Index of the patch.
     pub id: u32,
-    /// Area that the point represents [m^2].
+    /// Area of the patch [m^2].
     pub area: f64,
     /// Position and distance.
     pub point: SurfacePoint,
@@ -22,15 +23,15 @@ pub(super) struct PenetratingPoint {
 /// starts.
 #[derive(Debug, Default)]
 pub(super) struct SurfaceMemory {
-    /// Nodes within the candidate range at the last traversal, in ascending order: distance [m] in
-    /// the last test of all of them, and index.
+    /// Patches within the candidate range at the last traversal, in ascending order: distance [m]
+    /// in the last test of all of them, and index.
     pub candidates: Vec<(f64, u32)>,
     /// Distance by which the surfaces may have approached since then [m].
     approach: f64,
-    /// Distance by which the surfaces may approach until other nodes than the candidates may
+    /// Distance by which the surfaces may approach until other patches than the candidates may
     /// penetrate [m].
     slack: f64,
-    /// Nearest node.
+    /// Nearest patch.
     pub nearest: Option<u32>,
 }
 
@@ -48,40 +49,40 @@ impl SurfaceMemory {
     }
 }
 
-/// Nearest node found so far; the lowest index among equally near nodes.
-pub(super) struct NearestNode {
+/// Nearest patch found so far; the lowest index among equally near patches.
+pub(super) struct NearestPatch {
     /// Distance from the partner [m].
     pub distance: f64,
-    /// Index of the node; `None` if no node is nearer than that.
+    /// Index of the patch; `None` if no patch is nearer than that.
     pub index: Option<u32>,
 }
 
-impl NearestNode {
+impl NearestPatch {
     fn update(&mut self, distance: f64, index: u32) {
         let tied = distance == self.distance && self.index.is_some_and(|known| index < known);
         if distance < self.distance || tied {
-            *self = NearestNode { distance, index: Some(index) };
+            *self = NearestPatch { distance, index: Some(index) };
         }
     }
 }
 
-/// Collects the penetrating nodes among the candidates of the last traversal and returns the
-/// nearest node; `None` if other nodes may be nearer or penetrate.
+/// Collects the penetrating patches among the candidates of the last traversal and returns the
+/// nearest patch; `None` if other patches may be nearer or penetrate.
 pub(super) fn scan_candidates(
-    tree: &NodeTree,
+    tree: &PatchTree,
     partner: &PartnerField,
     memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
-) -> Option<NearestNode> {
+) -> Option<NearestPatch> {
     if memory.slack <= 0.0 {
         return None;
     }
     found.clear();
-    let mut nearest = NearestNode { distance: memory.slack, index: None };
-    // In a contact only the nodes matter that may penetrate.
+    let mut nearest = NearestPatch { distance: memory.slack, index: None };
+    // In a contact only the patches matter that may penetrate.
     for &(distance, index) in &memory.candidates {
         if distance < memory.approach {
-            nearest.update(test_node(tree, partner, index, f64::INFINITY, found), index);
+            nearest.update(test_patch(tree, partner, index, f64::INFINITY, found), index);
         }
     }
     if nearest.distance < 0.0 {
@@ -89,7 +90,7 @@ pub(super) fn scan_candidates(
     }
     found.clear();
     for (distance, index) in &mut memory.candidates {
-        *distance = test_node(tree, partner, *index, f64::INFINITY, found);
+        *distance = test_patch(tree, partner, *index, f64::INFINITY, found);
         nearest.update(*distance, *index);
     }
     memory.approach = 0.0;
@@ -98,14 +99,14 @@ pub(super) fn scan_candidates(
 
 /// Collects a patch if it penetrates; returns a lower bound of its distance, or infinity beyond
 /// `reach` [m].
-fn test_node(
-    tree: &NodeTree,
+fn test_patch(
+    tree: &PatchTree,
     partner: &PartnerField,
     index: u32,
     reach: f64,
     found: &mut Vec<PenetratingPoint>,
 ) -> f64 {
-    let patch = &tree.nodes[index as usize];
+    let patch = &tree.patches[index as usize];
     let extent = patch.extent_towards(partner);
     let distance = partner.distance_within(patch.position, reach + extent) - extent;
     if distance < 0.0
@@ -117,38 +118,38 @@ fn test_node(
     distance
 }
 
-/// Collects the penetrating nodes and returns the nearest node within `range` [m]; lists the
+/// Collects the penetrating patches and returns the nearest patch within `range` [m]; lists the
 /// candidates of the next searches.
-pub(super) fn scan_nodes(
-    tree: &NodeTree,
+pub(super) fn scan_patches(
+    tree: &PatchTree,
     partner: &PartnerField,
     range: f64,
     memory: &mut SurfaceMemory,
     found: &mut Vec<PenetratingPoint>,
-) -> NearestNode {
+) -> NearestPatch {
     found.clear();
     let SurfaceMemory { candidates, approach, slack, nearest: seed, .. } = memory;
     candidates.clear();
     *approach = 0.0;
     *slack = CANDIDATE_RANGE * tree.spacing;
-    let mut nearest = NearestNode { distance: range, index: None };
-    if let Some((index, node)) = seed.and_then(|n| Some((n, tree.nodes.get(n as usize)?))) {
-        let extent = node.extent_towards(partner);
-        nearest.update(partner.distance_within(node.position, range + extent) - extent, index);
+    let mut nearest = NearestPatch { distance: range, index: None };
+    if let Some((index, patch)) = seed.and_then(|n| Some((n, tree.patches.get(n as usize)?))) {
+        let extent = patch.extent_towards(partner);
+        nearest.update(partner.distance_within(patch.position, range + extent) - extent, index);
     }
     let extent = if partner.is_wall() { tree.extent } else { 0.0 };
     let mut cluster_index = 0;
     while let Some(cluster) = tree.clusters.get(cluster_index) {
-        // Only candidates and nodes nearer than the nearest one so far are of interest.
+        // Only candidates and patches nearer than the nearest one so far are of interest.
         if partner.is_beyond(cluster.centre, cluster.radius, nearest.distance.max(*slack) + extent)
         {
             cluster_index = cluster.skip as usize;
             continue;
         }
         if cluster.is_leaf(cluster_index) {
-            for index in cluster.nodes.0..cluster.nodes.1 {
+            for index in cluster.patches.0..cluster.patches.1 {
                 let reach = nearest.distance.max(*slack);
-                let distance = test_node(tree, partner, index, reach, found);
+                let distance = test_patch(tree, partner, index, reach, found);
                 nearest.update(distance, index);
                 if distance <= *slack {
                     candidates.push((distance, index));
