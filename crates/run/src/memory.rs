@@ -17,6 +17,13 @@ const BYTES_PER_SURFACE_CELL: f64 = 1200.0;
 /// Bytes of a surface node with its patches and their place in the contact search.
 const BYTES_PER_NODE: f64 = 400.0;
 
+/// Returns the sum of the squares of the diameters in cells, to which the work and memory of the
+/// coupling are proportional.
+pub(crate) fn surface_cells(setup: &Setup) -> f64 {
+    let across = |diameter: f64| diameter / setup.mesh.spacing.min_element();
+    setup.grains.iter().map(|grain| across(grain.shape.equivalent_diameter()).powi(2)).sum()
+}
+
 /// Returns the memory of a run: fields, forced faces of the grains, shapes and the distances
 /// sampled around them [bytes].
 pub(crate) fn needed(setup: &Setup) -> u64 {
@@ -26,10 +33,7 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
     let mut bytes = 0.0;
     if setup.fluid.is_some() {
         bytes += cells * setup.precision.bytes() as f64 * NUMBERS_PER_CELL;
-        let across = |diameter: f64| diameter / mesh.spacing.min_element();
-        bytes += (setup.grains.iter())
-            .map(|grain| across(grain.shape.equivalent_diameter()).powi(2) * BYTES_PER_SURFACE_CELL)
-            .sum::<f64>();
+        bytes += surface_cells(setup) * BYTES_PER_SURFACE_CELL;
     }
     // Grains of equal shape share it.
     let mut seen = BTreeSet::new();

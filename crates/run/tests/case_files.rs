@@ -477,16 +477,16 @@ fn grains_next_to_an_open_side_or_off_the_middle_of_a_flat_box_are_warned_of() {
             "title = \"box\"\n[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n[domain]\n\
              cells = {cells}\ncell_size = \"0.1 mm\"\nboundaries = {{ y = \"periodic\", z = \
              [{{ kind = \"inflow\", velocity = [0, 0, \"1 cm/s\"] }}, \"outflow\"] }}\n\
-             [[grain]]\nshape = {{ kind = \"ellipsoid\", size = [\"1 mm\", \"0.07 mm\", \"1 mm\"] }}\norientation = {{ short_axis = \"y\" }}\ndensity = 2000\n\
+             [[grain]]\nshape = {{ kind = \"ellipsoid\", size = [\"0.35 mm\", \"0.07 mm\", \"0.35 mm\"] }}\norientation = {{ short_axis = \"y\" }}\ndensity = 2000\n\
              position = {position}\n[time]\nend = 0.1\n"
         )
     };
-    let starts = warnings(&case("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.35 mm\"]"));
+    let starts = warnings(&case("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.675 mm\"]"));
     assert!(starts.contains("grain 0 starts within two cells of the open upper side"), "{starts}");
     let flat = warnings(&case("[30, 1, 60]", "[\"1.5 mm\", \"0.06 mm\", \"3 mm\"]"));
     assert!(flat.contains("its centre is at 60 um") || flat.contains("0.06 mm"), "{flat}");
     for (cells, position) in [
-        ("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.25 mm\"]"),
+        ("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.575 mm\"]"),
         ("[30, 1, 60]", "[\"1.5 mm\", \"0.05 mm\", \"3 mm\"]"),
     ] {
         let quiet = warnings(&case(cells, position));

@@ -2,16 +2,23 @@
 
 use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
 use super::settling::{impact_speed, is_free};
-use crate::{RunPlan, memory};
-use grainwake_shape::available_memory;
+use crate::RunPlan;
+use crate::memory::{self, surface_cells};
+use grainwake_shape::{Field, available_memory};
 use grainwake_solver::dem::Grain;
 use grainwake_solver::sim::Setup;
 
 /// Time of a step on one thread [ns per cell and byte of a number], from `grainwake bench`.
 const NS_PER_CELL_BYTE: f64 = 3.0;
-/// Time of a contact sub-step on one thread [ns per surface node], measured with heaps. Grains
-/// without contact take much less.
-const NS_PER_NODE: f64 = 25.0;
+/// Time of the coupling in a step on one thread [ns per square of the diameter in cells], from
+/// `grainwake run cases/periodic-suspension/case.toml`. Grains that touch take three times as much.
+const NS_PER_SURFACE_CELL: f64 = 8000.0;
+/// Time of a contact sub-step on one thread for a sphere, and for another grain with its surface
+/// nodes [ns], measured with heaps; rocks take half, boxes twice as much. Grains without contact
+/// take much less.
+const NS_PER_SPHERE: f64 = 1200.0;
+const NS_PER_GRAIN: f64 = 5000.0;
+const NS_PER_NODE: f64 = 2.0;
 
 /// Derived numbers and warnings. The JSON names are stable.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -78,10 +85,15 @@ impl Estimate {
             .map(|t| (time_step_s / (t / setup.contact.substeps_per_contact)).max(1.0));
         let seconds = |ns: f64| ns * 1e-9 / threads.max(1) as f64;
         let field_bytes = fluid.map_or(0.0, |_| cells as f64 * setup.precision.bytes() as f64);
-        let nodes: usize = setup.grains.iter().map(|g| g.shape.nodes().len()).sum();
-        let substep_s = seconds(nodes as f64 * NS_PER_NODE);
-        let contact_s = substep_s * contact_substeps.unwrap_or(1.0);
-        let step_s = seconds(field_bytes * NS_PER_CELL_BYTE);
+        // In a fluid the sub-steps of a contact are taken twice (decision 0014).
+        let passes = if fluid.is_some() { 2.0 } else { 1.0 };
+        let substep_ns = setup.grains.iter().map(|grain| match grain.shape.field() {
+            Field::Sphere(_) => NS_PER_SPHERE,
+            _ => NS_PER_GRAIN + NS_PER_NODE * grain.shape.nodes().len() as f64,
+        });
+        let contact_s = seconds(substep_ns.sum()) * passes * contact_substeps.unwrap_or(1.0);
+        let coupling_ns = fluid.map_or(0.0, |_| NS_PER_SURFACE_CELL * surface_cells(setup));
+        let step_s = seconds(field_bytes * NS_PER_CELL_BYTE + coupling_ns);
         let smallest = smallest_diameter(&setup.grains);
         let cells_per_diameter = (fluid.is_some() && smallest.is_finite())
             .then(|| smallest / setup.mesh.spacing.max_element());

@@ -184,9 +184,10 @@ impl Source {
                     .map_or("the file".into(), |(parent, _)| format!("`{parent}`"));
                 let hint = nearest(key, known.iter().copied());
                 let known = known.join(", ");
-                let help = match hint {
-                    Some(hint) => format!("did you mean `{hint}`? Keys of {parent}: {known}"),
-                    None => format!("keys of {parent}: {known}"),
+                let help = match (hint, shape_help(&owner)) {
+                    (Some(hint), _) => format!("did you mean `{hint}`? Keys of {parent}: {known}"),
+                    (None, Some(help)) => format!("{help}; keys of {parent}: {known}"),
+                    (None, None) => format!("keys of {parent}: {known}"),
                 };
                 let label =
                     hint.map_or("not a key here".into(), |hint| format!("did you mean `{hint}`?"));
@@ -210,7 +211,7 @@ impl Source {
                     Some(kind) => format!("wrong kind of value: {}", wrong_kind(kind)),
                     None => plainly(message),
                 };
-                (text, "here".into(), None)
+                (text, "here".into(), shape_help(&owner))
             }
         };
         let mut problem = Problem::new(text);
@@ -228,6 +229,18 @@ impl Source {
             .key(key)
             .help(format!("add {help}; `grainwake schema` lists every key"))
     }
+}
+
+/// Remedy for a wrong value of a key `shape` or `shapes`, or inside of it.
+fn shape_help(path: &str) -> Option<String> {
+    let word = path.split('.').find_map(|word| match word {
+        "shape" => Some("`file = \"x.grain\"`"),
+        "shapes" => Some("`files = [\"x.grain\"]`"),
+        _ => None,
+    })?;
+    Some(format!(
+        "a closed form is {{ kind = \"sphere\", diameter = \"2 mm\" }}; a grain file is {word} instead"
+    ))
 }
 
 fn collect_keys(table: &DeTable<'_>, prefix: &str, text: &str, entries: &mut Vec<Entry>) {

@@ -123,6 +123,18 @@ fn kinds_of_values_have_plain_names() {
 }
 
 #[test]
+fn a_file_as_shape_gets_the_key_of_files() {
+    for (set, words) in [
+        ("grain.0.shape='x.grain'", "a grain file is `file = \"x.grain\"` instead"),
+        ("grain.0.shape={ file = 'x.grain' }", "a grain file is `file = \"x.grain\"` instead"),
+        ("packing=[{ shapes = ['x.grain'] }]", "a grain file is `files = [\"x.grain\"]` instead"),
+    ] {
+        let p = problem(CASE, &[set]);
+        assert!(p.help.as_ref().is_some_and(|help| help.contains(words)), "{set}: {p:?}");
+    }
+}
+
+#[test]
 fn broken_toml_is_located() {
     let p = problem("[fluid\ndensity = 1\n", &[]);
     assert_eq!(p.place().unwrap().1, 1);
