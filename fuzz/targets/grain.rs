@@ -1,5 +1,5 @@
-//! `.grain` files: read, and queried if they are accepted. Each input is read as it is, and with its
-//! length and checksum renewed, so that damage reaches the decoder.
+//! `.grain` files: read, and queried if they are accepted. Each input is read as it is, and with
+//! its length and checksum renewed, so that damage reaches the decoder.
 
 #![no_main]
 

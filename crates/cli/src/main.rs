@@ -30,6 +30,7 @@ use out::{print, tell};
 fn main() -> std::process::ExitCode {
     let cli = Cli::parse();
     signals::survive_file_size_limit();
+    threads::limit_default_pool();
     let done = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Check(args) => check::check(args),

@@ -6,6 +6,7 @@ use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::progress::count;
 use crate::{print, tell};
 
 impl From<ReportError> for Exit {
@@ -41,16 +42,16 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         }
         let (finished, all) = done.runs;
         return print(&format!(
-            "{} ({} figures, {finished} of {all} runs finished)",
+            "{} ({}, {finished} of {all} runs finished)",
             done.page.display(),
-            done.png.len()
+            count(done.png.len(), "figure")
         ));
     }
     let done = render(&args.run)?;
     for note in &done.notes {
         tell!("note: {note}");
     }
-    print(&format!("{} ({} figures)", done.page.display(), done.png.len()))
+    print(&format!("{} ({})", done.page.display(), count(done.png.len(), "figure")))
 }
 
 /// Writes the film of a run folder.

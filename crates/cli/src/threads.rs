@@ -14,6 +14,16 @@ pub fn share(jobs: usize, threads: usize) -> (usize, usize) {
     grainwake_run::threads::share(jobs, threads, warn)
 }
 
+/// Limits the threads that commands without `--threads` start by `RAYON_NUM_THREADS`.
+pub fn limit_default_pool() {
+    if std::env::var_os("RAYON_NUM_THREADS").is_some() {
+        // Fails only if the pool exists already.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(grainwake_run::threads::resolve(0, |_| {}))
+            .build_global();
+    }
+}
+
 fn warn(text: String) {
     tell!("warning: {text}");
 }

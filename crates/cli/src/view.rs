@@ -1,6 +1,7 @@
 //! `grainwake view`.
 
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -33,10 +34,7 @@ impl From<ViewError> for Exit {
 pub fn view(args: &ViewArgs) -> Result<(), Exit> {
     let mut viewer = viewer(&args.folders)?;
     if let Some(file) = &args.save {
-        if file.is_dir() {
-            let message = format!("{} is a folder", file.display());
-            return Err(Exit::with_help(BAD_INPUT, message, "name a file, such as page.html"));
-        }
+        may_save(file)?;
         let notes = save(&mut viewer, file)?;
         for note in &notes {
             tell!("note: {note}");
@@ -53,6 +51,30 @@ pub fn view(args: &ViewArgs) -> Result<(), Exit> {
     }
     server.run();
     Ok(())
+}
+
+/// Refuses a name that is no page, and a file that is no page of this program.
+fn may_save(file: &Path) -> Result<(), Exit> {
+    let refused = |what: &str| {
+        let message = format!("--save: {} {what}", file.display());
+        Err(Exit::with_help(BAD_INPUT, message, "name a page, such as page.html"))
+    };
+    if file.is_dir() {
+        return refused("is a folder");
+    }
+    if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("html")) {
+        return refused("does not end in .html");
+    }
+    if !file.exists() {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    std::fs::File::open(file)?.take(1 << 12).read_to_end(&mut start)?;
+    let start = String::from_utf8_lossy(&start).to_lowercase();
+    if start.contains("<!doctype html>") && start.contains("grainwake") {
+        return Ok(());
+    }
+    refused("exists and is not a page of grainwake view")
 }
 
 /// Creates the viewer of run folders, or of the runs of one study folder.

@@ -184,6 +184,15 @@ fn thousands_of_threads_of_a_study_are_reduced_with_a_warning() {
     done.stderr(contains("warning: 2 at once with 5000 threads each are too many for"));
 }
 
+#[test]
+fn thousands_of_threads_of_the_environment_are_reduced() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut program = grainwake();
+    program.env("RAYON_NUM_THREADS", "5000").timeout(std::time::Duration::from_secs(60));
+    program.args(["grain", "make", "ellipsoid", "2 mm", "2 mm", "1 mm", "--cells", "40", "-o"]);
+    program.arg(folder.path().join("a.grain")).assert().success();
+}
+
 #[cfg(unix)]
 #[test]
 fn devices_are_no_files() {

@@ -148,3 +148,19 @@ fn bad_input_is_refused_with_the_remedy() {
     view(&[&out], &["--port", &port]).code(4).stderr(contains("--port"));
     view(&[&out], &["--port", "80", "--save", "x.html"]).code(2);
 }
+
+#[test]
+fn only_pages_are_replaced() {
+    let (folder, out) = run(DRY);
+    let case = folder.path().join("case.toml");
+    let text = std::fs::read_to_string(&case).unwrap();
+    let save = |file: &Path| grainwake().arg("view").arg(&out).arg("--save").arg(file).assert();
+    save(&case).code(2).stderr(contains("does not end in .html"));
+    assert_eq!(std::fs::read_to_string(&case).unwrap(), text);
+    let other = folder.path().join("notes.html");
+    std::fs::write(&other, "<!DOCTYPE html><title>notes</title>").unwrap();
+    save(&other).code(2).stderr(contains("is not a page of grainwake view"));
+    let page = folder.path().join("page.html");
+    save(&page).success();
+    save(&page).success();
+}

@@ -187,7 +187,7 @@ fn rows_at(
     };
     let Some(time) = last_before(&|time| time <= latest) else {
         let first = times.iter().copied().fold(f64::INFINITY, f64::min);
-        let what = format!("the first rows are at {first} s, after {latest} s");
+        let what = format!("the first rows are at {first} s, after {} s", at.unwrap_or(latest));
         return Err(FormatError::line(file, 2, what));
     };
     let at_time = |wanted: f64| (0..count).filter(move |row| times[*row] == wanted);

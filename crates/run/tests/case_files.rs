@@ -458,6 +458,19 @@ fn ways_out_are_warned_of() {
     assert!(open.contains("lower side of z"), "{open}");
     let up = walls("[\"wall\", \"outflow\"]");
     assert!(!up.contains("leave through"), "{up}");
+    let float = good(
+        &PAIR
+            .replacen(
+                "cell_size = \"0.25 mm\"",
+                "cell_size = \"0.25 mm\"\nboundaries = { z = [\"wall\", \"free-surface\"] }",
+                1,
+            )
+            .replace("1500 kg/m3", "500 kg/m3")
+            .replace("1.5 g/cm3", "500 kg/m3"),
+    );
+    let float = float.estimate(1).warnings.join("\n");
+    assert!(float.contains("grains may float in the free surface"), "{float}");
+    assert!(float.contains("make no waves and feel no splash and no surface tension"), "{float}");
     // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.
     let fall = walls("\"periodic\"");
     assert!(fall.contains("body_acceleration = [0, 0, 6.7433e-4]"), "{fall}");
@@ -783,6 +796,23 @@ fn a_fixed_step_is_compared_with_the_velocities_at_the_start() {
     assert!(fast.contains("fixed step of 0.25 ms or less"), "{fast}");
     assert!(!start("0.1 m/s", "step = \"0.5 ms\"").contains("CFL number"));
     assert!(!start("1 m/s", "").contains("CFL number"));
+}
+
+#[test]
+fn a_fixed_grain_does_not_stiffen_the_contact() {
+    let stiffness = |more: &str| {
+        let case = format!(
+            "[domain]\nsize = [\"20 mm\", \"20 mm\", \"20 mm\"]\n[time]\nend = \"0.1 s\"\n\
+             [[grain]]\nshape = {{ kind = \"sphere\", diameter = \"0.2 mm\" }}\ndensity = 2500\n\
+             position = [\"10 mm\", \"10 mm\", \"15 mm\"]\n{more}"
+        );
+        good(&case).setup.contact.normal_stiffness
+    };
+    let fixed = "[[grain]]\nshape = { kind = \"sphere\", diameter = \"8 mm\" }\ndensity = 2500\n\
+                 position = [\"10 mm\", \"10 mm\", \"5 mm\"]\nmotion = \"fixed\"\n";
+    let free = fixed.replace("motion = \"fixed\"\n", "");
+    assert_eq!(stiffness(fixed), stiffness(""));
+    assert!(stiffness(&free) > 100.0 * stiffness(""));
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Case files and checkpoint states against damage: a located refusal or a result, never a panic,
 //! and bounded memory. `PROPTEST_CASES` sets the number of cases.
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "../../formats/tests/common/peak_memory.rs"]
+mod peak_memory;
+
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use grainwake_run::Parent;
 use grainwake_run::case::Case;
@@ -14,30 +15,6 @@ use sha2::{Digest, Sha256};
 
 /// Most memory that a case of these tests may take [bytes]. Grids are allocated later, by the run.
 const MOST_MEMORY: usize = 512 << 20;
-
-/// Allocator that records the memory in use and its peak.
-struct Counting;
-
-static IN_USE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is passed on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let now = IN_USE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        PEAK.fetch_max(now, Ordering::Relaxed);
-        // SAFETY: the caller's obligations are those of the system's allocator.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        IN_USE.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller's obligations are those of the system's allocator.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// A pair in water with most keys of the grains, the contact and the outputs.
 const PAIR: &str = r#"
@@ -250,7 +227,7 @@ proptest! {
                 prop_assert!(!error.to_string().is_empty());
             }
         }
-        let peak = PEAK.load(Ordering::Relaxed);
+        let peak = peak_memory::peak();
         prop_assert!(peak < MOST_MEMORY, "{} MB for\n{text}", peak >> 20);
     }
 }
@@ -285,7 +262,7 @@ proptest! {
             // A state that is accepted can be advanced or fails with an error.
             drop(simulation.step(f64::INFINITY));
         }
-        let peak = PEAK.load(Ordering::Relaxed);
+        let peak = peak_memory::peak();
         prop_assert!(peak < MOST_MEMORY, "{} MB", peak >> 20);
     }
 }
@@ -333,7 +310,7 @@ proptest! {
             body.truncate(cut.index(body.len()));
         }
         found(folder.path(), &body);
-        let peak = PEAK.load(Ordering::Relaxed);
+        let peak = peak_memory::peak();
         prop_assert!(peak < MOST_MEMORY, "{} MB", peak >> 20);
     }
 }

@@ -1,16 +1,22 @@
 //! Readers against arbitrary and damaged bytes: a refusal or a result, never a panic, and no more
 //! memory than the limits allow. `PROPTEST_CASES` sets the number of cases.
 
+#[path = "../../formats/tests/common/peak_memory.rs"]
+mod peak_memory;
 #[path = "common/tiled.rs"]
 mod tiled;
 
 use grainwake_shape::mesh::read_mesh;
 use grainwake_shape::scan::{Volume, read_volume};
-use grainwake_shape::{ReadLimits, Shape};
+use grainwake_shape::{ReadLimits, Shape, ShapeOptions, analytic};
 use proptest::prelude::*;
+use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::path::Path;
 use tiled::Layout;
+
+/// Most memory that these tests may take [bytes].
+const MOST_MEMORY: usize = 512 << 20;
 
 /// Small, so that a file that claims much is refused.
 fn limits() -> ReadLimits {
@@ -64,12 +70,35 @@ fn slice_file() -> Vec<u8> {
     std::fs::read(&path).unwrap()
 }
 
+/// A `.grain` file with the length of its body (bytes 12 to 19) and its checksum corrected.
+fn renewed(bytes: &[u8]) -> Vec<u8> {
+    let mut file = bytes[..bytes.len().saturating_sub(32)].to_vec();
+    let body = file.len().saturating_sub(20) as u64;
+    if let Some(length) = file.get_mut(12..20) {
+        length.copy_from_slice(&body.to_le_bytes());
+    }
+    let checksum = Sha256::digest(&file);
+    file.extend(checksum);
+    file
+}
+
 fn zipped(name: &str, bytes: &[u8]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = zip::write::SimpleFileOptions::default();
     archive.start_file(name, options).unwrap();
     archive.write_all(bytes).unwrap();
     archive.finish().unwrap().into_inner()
+}
+
+fn small_ellipsoid() -> Shape {
+    let options = ShapeOptions {
+        cells: Some(8),
+        least_cells: 8,
+        nodes: Some(16),
+        roundness: false,
+        ..Default::default()
+    };
+    analytic::ellipsoid(1e-3, 0.9e-3, 0.8e-3, &options).unwrap()
 }
 
 /// A sound file of each kind.
@@ -124,6 +153,7 @@ fn sound() -> Vec<(&'static str, Vec<u8>)> {
         ("stl", stl),
         ("anm", anm.into()),
         ("grain", Shape::sphere(1e-3, 20).to_bytes()),
+        ("grain", small_ellipsoid().to_bytes()),
     ]
 }
 
@@ -165,11 +195,15 @@ proptest! {
                 bytes.truncate(cut.index(bytes.len()));
             }
             open(extension, &bytes);
-            // The sum of an archive gives damage away: also what is packed is damaged.
-            if extension == "npy" {
-                open("npz", &zipped("a.npy", &bytes));
-            }
+            // A checksum gives damage away: also what it protects is damaged.
+            match extension {
+                "npy" => open("npz", &zipped("a.npy", &bytes)),
+                "grain" => open("grain", &renewed(&bytes)),
+                _ => true,
+            };
         }
+        let peak = peak_memory::peak();
+        prop_assert!(peak < MOST_MEMORY, "{} MB", peak >> 20);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Content of a `.grain` file: encoding and decoding of a shape, and the hash of its geometry.
 
 use super::levels;
+use crate::error::size;
 use crate::field::SampledField;
 use crate::limits::hex;
 use crate::morphology::Morphology;
@@ -8,6 +9,7 @@ use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
 use crate::quality::Quality;
 use crate::shape::{Field, Shape};
+use glam::DVec3;
 use grainwake_formats::codec::{self, Decoder, Encoder, invalid};
 use sha2::{Digest, Sha256};
 use std::io;
@@ -143,12 +145,7 @@ pub(super) fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
         1 => Field::Sampled(decode_grid(from)?),
         other => return Err(invalid(format!("field of kind {other}"))),
     };
-    let finite = inertia.is_finite() && lower.is_finite() && upper.is_finite();
-    let positive = [volume, bounding_radius, morphology.a, inertia.min_element()];
-    if !finite || positive.iter().any(|v| !v.is_finite() || *v <= 0.0) {
-        return Err(invalid("a size is not positive"));
-    }
-    Ok(Shape {
+    let shape = Shape {
         field,
         nodes,
         volume,
@@ -159,7 +156,51 @@ pub(super) fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
         morphology,
         quality: gradient_error.map(|gradient_error| Quality { gradient_error, volume_error }),
         provenance,
-    })
+    };
+    check(&shape)?;
+    Ok(shape)
+}
+
+/// Refuses sizes that contradict each other, which a damaged file with a correct checksum may hold.
+fn check(shape: &Shape) -> io::Result<()> {
+    let radius = shape.bounding_radius;
+    size("bounding radius", radius).map_err(|error| invalid(error.to_string()))?;
+    // Rounding, and nodes and bounds that lie a little outside the surface.
+    let limit = 1.1 * radius;
+    let is_length = |length: f64| length > 0.0 && length <= 2.0 * limit;
+    let is_inside = |x: DVec3| x.is_finite() && x.abs().max_element() <= limit;
+    let is_area = |area: f64| area > 0.0 && area.is_finite();
+
+    let (volume, inertia) = (shape.volume, shape.inertia);
+    if !(volume > 0.0 && volume <= (2.0 * limit).powi(3))
+        || !(inertia.min_element() > 0.0 && inertia.max_element() <= volume * limit * limit)
+    {
+        return Err(invalid("the volume or the moments of inertia"));
+    }
+    if !(is_inside(shape.lower) && is_inside(shape.upper) && shape.lower.cmplt(shape.upper).all()) {
+        return Err(invalid("the bounding box"));
+    }
+    if !shape.nodes.iter().all(|node| is_inside(node.position) && is_area(node.area)) {
+        return Err(invalid("the surface nodes"));
+    }
+    let m = &shape.morphology;
+    if ![m.a, m.b, m.c].into_iter().all(is_length) || !is_area(m.area) {
+        return Err(invalid("the principal axes or the area"));
+    }
+    let p = &shape.provenance;
+    if !(p.centroid.is_finite() && p.rotation.is_finite() && p.scale.is_finite()) {
+        return Err(invalid("the pose in the source"));
+    }
+    let fits = match &shape.field {
+        Field::Sphere(own) => (own / radius - 1.0).abs() < 1e-9,
+        Field::Sampled(field) => {
+            let covers =
+                field.lower().cmple(shape.lower).all() && field.upper().cmpge(shape.upper).all();
+            let (quantum, spacing) = (field.quantum(), field.spacing());
+            covers && spacing <= radius && quantum <= spacing && quantum >= 1e-12 * spacing
+        }
+    };
+    if fits { Ok(()) } else { Err(invalid("the distance field does not fit the shape")) }
 }
 
 fn encode_grid(out: &mut Encoder, field: &SampledField) -> io::Result<()> {

@@ -51,6 +51,10 @@ pub(super) fn unpack(packed: &[u8], dims: [usize; 3]) -> Option<Vec<f32>> {
     let mut bytes = Vec::new();
     // Five bytes hold any admissible difference; one more detects an overlong stream.
     ZlibDecoder::new(packed).take(5 * count as u64 + 1).read_to_end(&mut bytes).ok()?;
+    // Every level takes a byte or more: few bytes must not claim memory for many levels.
+    if bytes.len() < count {
+        return None;
+    }
     let mut stream = bytes.into_iter();
     let mut values: Vec<i64> = Vec::with_capacity(count);
     for (i, j, k) in places(dims) {

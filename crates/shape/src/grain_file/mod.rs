@@ -87,10 +87,10 @@ impl Shape {
             return Err(ShapeError::malformed(path, reason));
         }
         let mut body = &body[..];
-        let shape = content::decode(&mut Decoder::new(&mut body), version).ok();
-        shape
-            .filter(|_| body.is_empty())
-            .ok_or_else(|| ShapeError::malformed(path, "the content of the grain file is invalid"))
+        let invalid = |what| ShapeError::malformed(path, format!("invalid grain file: {what}"));
+        let shape = content::decode(&mut Decoder::new(&mut body), version);
+        let shape = shape.map_err(|error| invalid(error.to_string()))?;
+        if body.is_empty() { Ok(shape) } else { Err(invalid("it has surplus bytes".into())) }
     }
 }
 

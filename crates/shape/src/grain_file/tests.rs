@@ -1,7 +1,9 @@
 //! Tests of the `.grain` format.
 
 use super::*;
+use crate::shape::Field;
 use crate::{ShapeOptions, analytic};
+use glam::DVec3;
 
 /// Length of signature, version and body length.
 const HEAD: usize = 8 + 4 + 8;
@@ -73,6 +75,41 @@ fn forged_content_is_refused() {
         }
     }
     assert!(refused > 0);
+}
+
+/// Found by fuzzing: sizes that are no numbers, or that contradict each other.
+#[test]
+fn contradictory_sizes_are_refused() {
+    let forged = |change: &dyn Fn(&mut Shape)| {
+        let mut shape = egg();
+        change(&mut shape);
+        Shape::from_bytes(&shape.to_bytes(), Path::new("x")).unwrap_err().to_string()
+    };
+    let egg_radius = egg().bounding_radius;
+    for (change, words) in [
+        (&(|s: &mut Shape| s.bounding_radius = 1e9) as &dyn Fn(&mut Shape), "bounding radius"),
+        (&|s: &mut Shape| s.volume *= 20.0, "volume"),
+        (&|s: &mut Shape| s.inertia.z = f64::NAN, "moments of inertia"),
+        (&|s: &mut Shape| s.upper.x = 3.0 * egg_radius, "bounding box"),
+        (&|s: &mut Shape| s.lower.y = s.upper.y, "bounding box"),
+        (&|s: &mut Shape| s.nodes[7].position.x = f64::INFINITY, "surface nodes"),
+        (&|s: &mut Shape| s.nodes[7].area = -1.0, "surface nodes"),
+        (&|s: &mut Shape| s.morphology.b = f64::NAN, "principal axes"),
+        (&|s: &mut Shape| s.provenance.scale = f64::NAN, "pose in the source"),
+        (&|s: &mut Shape| s.field = Field::Sphere(f64::NAN), "distance field"),
+        (&|s: &mut Shape| s.field = Field::Sphere(2.0 * egg_radius), "distance field"),
+        (
+            &|s: &mut Shape| {
+                if let Field::Sampled(field) = &s.field {
+                    s.field = Field::Sampled(field.clone().shifted(DVec3::splat(egg_radius)));
+                }
+            },
+            "distance field",
+        ),
+    ] {
+        let message = forged(change);
+        assert!(message.contains(words), "{words}: {message}");
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::materials::restitution;
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Number, Quantity};
 use crate::case::raw::{RawContact, RawFluid};
-use crate::case::settling::{impact_speed, smallest_diameter};
+use crate::case::settling::{impact_speed, is_free, smallest_diameter};
 use crate::number_format::{length, quantity};
 use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, Material};
 use grainwake_solver::flow::FluidParams;
@@ -220,6 +220,8 @@ fn stiffness_for(
         let weight = (grain.density - buoyant).abs() * grain.shape.volume() * gravity.length();
         ContactParams::stiffness_for_overlap(grain.mass(), speed, overlap).max(weight / overlap)
     };
-    let stiffness = grains.iter().map(needed).fold(0.0, f64::max);
+    // A fixed grain hits nothing.
+    let moves = |grain: &&Grain| is_free(grain) || grain.velocity != DVec3::ZERO;
+    let stiffness = grains.iter().filter(moves).map(needed).fold(0.0, f64::max);
     if stiffness > 0.0 { stiffness } else { ContactParams::default().normal_stiffness }
 }
