@@ -147,7 +147,12 @@ fn a_study_without_an_analysis_has_figures_all_the_same() {
     };
     run(&[]).stderr(contains("`analysis` file"));
     run(&["--quiet"]).stderr("");
-    grainwake().arg("report").arg(&out).assert().success().stdout(contains("(1 figure, 2 of 2 runs finished)"));
+    grainwake()
+        .arg("report")
+        .arg(&out)
+        .assert()
+        .success()
+        .stdout(contains("(1 figure, 2 of 2 runs finished)"));
     assert!(out.join("figures/fig01-gap.png").is_file());
 }
 

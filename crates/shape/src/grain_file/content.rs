@@ -172,9 +172,9 @@ fn check(shape: &Shape) -> io::Result<()> {
     let is_area = |area: f64| area > 0.0 && area.is_finite();
 
     let (volume, inertia) = (shape.volume, shape.inertia);
-    if !(volume > 0.0 && volume <= (2.0 * limit).powi(3))
-        || !(inertia.min_element() > 0.0 && inertia.max_element() <= volume * limit * limit)
-    {
+    let is_volume = volume > 0.0 && volume <= (2.0 * limit).powi(3);
+    let is_inertia = |moment: f64| moment > 0.0 && moment <= volume * limit * limit;
+    if !is_volume || !inertia.to_array().into_iter().all(is_inertia) {
         return Err(invalid("the volume or the moments of inertia"));
     }
     if !(is_inside(shape.lower) && is_inside(shape.upper) && shape.lower.cmplt(shape.upper).all()) {
