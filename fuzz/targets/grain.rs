@@ -3,11 +3,14 @@
 
 #![no_main]
 
+#[path = "../../crates/shape/tests/common/renewed.rs"]
+mod renewed;
+
 use std::path::Path;
 
 use grainwake_shape::Shape;
 use libfuzzer_sys::fuzz_target;
-use sha2::{Digest, Sha256};
+use renewed::renewed;
 
 fuzz_target!(|bytes: &[u8]| {
     query(bytes);
@@ -21,17 +24,4 @@ fn query(bytes: &[u8]) {
         let again = Shape::from_bytes(&shape.to_bytes(), Path::new("again.grain"));
         assert!(again.is_ok_and(|again| again.digest() == shape.digest()));
     }
-}
-
-/// Returns the file with the length of its body (bytes 12 to 19) and its checksum (the last 32
-/// bytes) corrected.
-fn renewed(bytes: &[u8]) -> Vec<u8> {
-    let mut file = bytes[..bytes.len().saturating_sub(32)].to_vec();
-    let body = file.len().saturating_sub(20) as u64;
-    if let Some(length) = file.get_mut(12..20) {
-        length.copy_from_slice(&body.to_le_bytes());
-    }
-    let checksum = Sha256::digest(&file);
-    file.extend(checksum);
-    file
 }

@@ -3,6 +3,8 @@
 
 #[path = "../../formats/tests/common/peak_memory.rs"]
 mod peak_memory;
+#[path = "common/renewed.rs"]
+mod renewed;
 #[path = "common/tiled.rs"]
 mod tiled;
 
@@ -10,7 +12,7 @@ use grainwake_shape::mesh::read_mesh;
 use grainwake_shape::scan::{Volume, read_volume};
 use grainwake_shape::{ReadLimits, Shape, ShapeOptions, analytic};
 use proptest::prelude::*;
-use sha2::{Digest, Sha256};
+use renewed::renewed;
 use std::io::Write;
 use std::path::Path;
 use tiled::Layout;
@@ -68,18 +70,6 @@ fn slice_file() -> Vec<u8> {
     let slice = Volume::from_labels([5, 4, 1], labels).unwrap();
     slice.save_labels(&path).unwrap();
     std::fs::read(&path).unwrap()
-}
-
-/// A `.grain` file with the length of its body (bytes 12 to 19) and its checksum corrected.
-fn renewed(bytes: &[u8]) -> Vec<u8> {
-    let mut file = bytes[..bytes.len().saturating_sub(32)].to_vec();
-    let body = file.len().saturating_sub(20) as u64;
-    if let Some(length) = file.get_mut(12..20) {
-        length.copy_from_slice(&body.to_le_bytes());
-    }
-    let checksum = Sha256::digest(&file);
-    file.extend(checksum);
-    file
 }
 
 fn zipped(name: &str, bytes: &[u8]) -> Vec<u8> {
