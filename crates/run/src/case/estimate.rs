@@ -10,9 +10,10 @@ use grainwake_solver::sim::Setup;
 
 /// Time of a step on one thread [ns per cell and byte of a number], from `grainwake bench`.
 const NS_PER_CELL_BYTE: f64 = 3.0;
-/// Time of the coupling in a step on one thread [ns per square of the diameter in cells], from
-/// `grainwake run cases/periodic-suspension/case.toml`. Grains that touch take three times as much.
-const NS_PER_SURFACE_CELL: f64 = 8000.0;
+/// Time of the coupling in a step on one thread [ns per square of the diameter in cells], from the
+/// `passes` of `cases/dkt-pair/quick.toml` (12,000) and `cases/periodic-suspension/case.toml`
+/// (15,000). Spheres take half, grains that touch three times as much.
+const NS_PER_SURFACE_CELL: f64 = 12_000.0;
 /// Time of a contact sub-step on one thread for a sphere, and for another grain with its surface
 /// nodes [ns], measured with heaps; rocks take half, boxes twice as much. Grains without contact
 /// take much less.
