@@ -26,8 +26,7 @@ say "licences and sources accepted"
 # 2. The program with completions, manual pages and licences, as one archive.
 cargo build --release --locked --quiet -p grainwake
 program="${CARGO_TARGET_DIR:-$root/target}/release/grainwake"
-size="$(stat -c %s "$program")"
-[ "$size" -le 20000000 ] || fail "the program has $size bytes, more than 20 MB"
+size="$(bash .ci/program_size.sh)"
 version="$("$program" -V | cut -d' ' -f2)"
 "$program" --version | grep -q "(commit $commit)" || fail "--version lacks the commit $commit"
 name="grainwake-$version-$(rustc -vV | sed -n 's/^host: //p')"

@@ -14,7 +14,10 @@ pub(crate) trait Distance: Sync {
 
     /// Returns a function for the distance and its gradient at a converging sequence of points. The
     /// default differentiates numerically with `step` [m].
-    fn closing_in(&self, step: f64) -> impl FnMut(DVec3) -> (f64, DVec3) {
+    fn closing_in(&self, step: f64) -> impl FnMut(DVec3) -> (f64, DVec3)
+    where
+        Self: Sized,
+    {
         move |x| {
             let value = |x: DVec3| self.near(x, &mut 0);
             let along = |a: DVec3| (value(x + step * a) - value(x - step * a)) / (2.0 * step);

@@ -112,7 +112,6 @@ pub fn limit_instructions(highest: InstructionSet) -> InstructionSet {
 }
 
 /// Runs `kernel` with the instruction set of [`instructions`].
-#[inline]
 pub fn dispatch<K: Kernel>(kernel: K) {
     match instructions() {
         // SAFETY: `instructions` never exceeds the sets detected on this machine.

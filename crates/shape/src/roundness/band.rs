@@ -30,7 +30,7 @@ impl Band {
     /// of it most samples are interpolated: the distance is nearly linear there, except where a
     /// concave body has two nearest points.
     pub(super) fn whole(
-        distance: &impl Distance,
+        distance: &dyn Distance,
         lower: DVec3,
         upper: DVec3,
         spacing: f64,
@@ -62,7 +62,7 @@ impl Band {
     /// Samples the body to `reach` [samples] around the level set; blocks of samples farther away
     /// have the distance of their centre.
     pub(super) fn around(
-        distance: &(impl Fn(DVec3, &mut u32) -> f64 + Sync),
+        distance: &dyn Distance,
         lower: DVec3,
         upper: DVec3,
         spacing: f64,
@@ -89,7 +89,7 @@ impl Band {
         };
         let near: Vec<f64> = (0..blocks.iter().product())
             .into_par_iter()
-            .map_init(|| 0, |hint, n| distance(centre(n), hint) - level)
+            .map_init(|| 0, |hint, n| distance.near(centre(n), hint) - level)
             .collect();
         let mut values = vec![0.0f32; dims.iter().product()];
         values.par_chunks_mut(dims[0]).enumerate().for_each(|(row, line)| {
@@ -100,7 +100,7 @@ impl Band {
                 *value = if centre.abs() > needed {
                     centre as f32
                 } else {
-                    (distance(at([i, j, k]), &mut hint) - level) as f32
+                    (distance.near(at([i, j, k]), &mut hint) - level) as f32
                 };
             }
         });

@@ -91,7 +91,7 @@ impl Lost {
 /// Returns the roundness of the body in the box with the largest inscribed sphere of radius
 /// `inscribed`, or `None` if the grid would be too large.
 pub(crate) fn measure(
-    distance: &impl Distance,
+    distance: &dyn Distance,
     lower: DVec3,
     upper: DVec3,
     inscribed: f64,
@@ -115,11 +115,10 @@ pub(crate) fn measure(
     }
 }
 
-fn of_exact(distance: &impl Distance, lower: DVec3, upper: DVec3, inscribed: f64) -> Option<f64> {
+fn of_exact(distance: &dyn Distance, lower: DVec3, upper: DVec3, inscribed: f64) -> Option<f64> {
     let spacing = inscribed / CELLS;
     let level = LEVEL * spacing;
-    let near = |x: DVec3, hint: &mut u32| distance.near(x, hint);
-    let band = Band::around(&near, lower, upper, spacing, [level, REACH * WIDTHS[1]])?;
+    let band = Band::around(distance, lower, upper, spacing, [level, REACH * WIDTHS[1]])?;
     let mesh = band.surface();
     let mut areas = vec![0.0; mesh.vertices.len()];
     for (face, triangle) in mesh.triangles.iter().enumerate() {

@@ -55,7 +55,7 @@ type Bend = (DVec3, DMat3);
 /// `cuts` [m] are excluded. Returns `None` if hardly any surface remains or the grid would be too
 /// large.
 pub(super) fn measure(
-    distance: &impl Distance,
+    distance: &dyn Distance,
     [lower, upper]: [DVec3; 2],
     inscribed: f64,
     image: Kernel,
