@@ -5,6 +5,7 @@ mod measure;
 mod table;
 mod triad;
 
+use grainwake_run::admit_memory;
 use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{InstructionSet, limit_instructions};
 
@@ -27,11 +28,10 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
             "--size takes 16 to 4096 cells along each axis, --steps at least one step",
         ));
     }
-    let own = (args.case.as_ref())
-        .map(|path| kind::case(path, &kind::overrides(&[], &args.set)))
-        .transpose()?;
-    if let Some(case) = &own {
-        case.admit_memory()?;
+    let own = (args.case.as_ref()).map(|path| kind::case(path, &args.overrides)).transpose()?;
+    if own.is_none() && !args.overrides.list().is_empty() {
+        let message = "--set and --unset change a case file, and none is given";
+        return Err(Exit::new(BAD_INPUT, message));
     }
     if let Some(set) = args.instructions {
         let widest = InstructionSet::widest();
@@ -53,12 +53,15 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     let steps = Steps { untimed: args.warm_up, timed: args.steps, threads };
     let measured: Vec<Measured> = threads::on(threads, || {
         if let Some(case) = own {
+            admit_memory(&case.setup)?;
             return Ok(vec![measure::measure(case.setup, &steps)?]);
         }
         let each = sizes.into_iter();
         each.map(|cells| {
             let case = BenchCase { cells, grains: args.grains, scheme, precision: args.precision };
-            measure::measure(case.setup()?, &steps)
+            let setup = case.setup()?;
+            admit_memory(&setup)?;
+            measure::measure(setup, &steps)
         })
         .collect::<Result<_, Exit>>()
     })??;

@@ -3,7 +3,7 @@
 use grainwake_run::case::Case;
 use grainwake_run::case::{Estimate, cells_for_drag_error, drag_error_text};
 use grainwake_run::number_format::{number, quantity, size, vector};
-use grainwake_run::{Probe, ProbePlace};
+use grainwake_run::{Probe, ProbePlace, admit_memory};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 
 use crate::args::CheckArgs;
@@ -14,7 +14,7 @@ use crate::{kind, print, threads};
 
 /// Checks a case and prints its derived numbers, cost and warnings.
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
-    let case = kind::case(&args.case, &kind::overrides(&args.unset, &args.set))?;
+    let case = kind::case(&args.case, &args.overrides)?;
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let estimate = case.estimate(threads);
     if args.json {
@@ -22,7 +22,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Exit> {
     } else {
         print(&table(&case, &estimate, threads))?;
     }
-    case.admit_memory().map_err(Exit::from)
+    admit_memory(&case.setup).map_err(Exit::from)
 }
 
 /// Returns one line per warning.

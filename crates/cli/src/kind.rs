@@ -8,6 +8,7 @@ use grainwake_study::{Study, StudyError};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use crate::args::Overrides;
 use crate::exit::{BAD_INPUT, Exit};
 
 /// Top-level keys that occur in one of the two kinds only.
@@ -41,14 +42,9 @@ fn kind(path: &Path) -> Option<Kind> {
     }
 }
 
-/// Returns the overrides of `--unset` and `--set`, in this order.
-pub fn overrides(unset: &[String], set: &[String]) -> Vec<String> {
-    unset.iter().map(|key| format!("-{key}")).chain(set.iter().cloned()).collect()
-}
-
 /// Reads a case file and applies overrides.
-pub fn case(path: &Path, set: &[String]) -> Result<Case, Exit> {
-    Case::load(path, set).map_err(|error| {
+pub fn case(path: &Path, overrides: &Overrides) -> Result<Case, Exit> {
+    Case::load(path, &overrides.list()).map_err(|error| {
         if matches!(error, CaseError::Invalid(_)) && kind(path) == Some(Kind::Study) {
             return Exit::with_help(
                 BAD_INPUT,

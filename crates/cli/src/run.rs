@@ -15,7 +15,7 @@ use crate::{check, expect, kind, print, signals, tell, threads};
 
 /// Runs a case.
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
-    let case = kind::case(&args.case, &kind::overrides(&args.unset, &args.set))?;
+    let case = kind::case(&args.case, &args.overrides)?;
     let out = args.output.clone().unwrap_or_else(|| default_folder(&args.case));
     let threads = threads::resolve(args.threads.unwrap_or(case.threads));
     let existing = match (args.resume, args.resume_or_start, args.force) {

@@ -58,7 +58,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let study = kind::study(&args.study)?;
     let selection = args.only.as_deref().map_or(Ok(Selection::All), Selection::parse);
     let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let plan = Plan::resolve(&study, &args.set)?.accepting(&args.accept);
+    let plan = Plan::resolve(&study, &args.overrides.list())?.accepting(&args.accept);
     let plan = plan.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let runs = &plan.runs;
     let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;

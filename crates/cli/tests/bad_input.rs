@@ -159,6 +159,8 @@ fn a_box_beyond_the_memory_is_refused_with_both_figures() {
         refused
             .stderr(contains("the run needs 7040 GB of memory and").and(contains("GB are free")));
     }
+    let bench = grainwake().args(["bench", "--size", "4000", "4000", "4000"]).assert().code(2);
+    bench.stderr(contains("GB of memory and").and(contains("GB are free")));
     assert!(!folder.path().join("runs").exists());
 }
 

@@ -138,6 +138,16 @@ fn unset_removes_a_key_so_that_its_default_applies() {
         .stderr(contains("--unset time.speed: the case has no such key"))
         .stderr(contains("present are end, step"));
     check(&["--unset", "grain.7.density"]).code(2).stderr(contains("grain.0, grain.1, grain.2"));
+    let bench = |more: &[&str]| {
+        let mut command = grainwake();
+        command.args(["bench", "--steps", "1", "--warm-up", "0"]).args(more).assert()
+    };
+    let path = case.to_str().unwrap();
+    bench(&[path, "--set", "time.max_step=1 ms"]).code(2);
+    bench(&[path, "--unset", "time.step", "--set", "time.max_step=1 ms"]).success();
+    bench(&["--unset", "time.step"]).code(2).stderr(contains("none is given"));
+    let validate = ["validate", "contact/bounce", "--quiet", "--unset", "time.speed"];
+    grainwake().args(validate).assert().code(2).stderr(contains("the case has no such key"));
 }
 
 #[test]

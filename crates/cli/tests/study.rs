@@ -183,6 +183,9 @@ fn wrong_studies_end_with_2_and_a_place() {
     run(STUDY, &["--only", "haevy"]).stderr(contains("did you mean \"heavy\"?"));
     run(STUDY, &["--only", "3/2"]).stderr(contains("between 1 and N"));
     run(STUDY, &["--set", "time.end=1 mm"]).stderr(contains("--set"));
+    run(STUDY, &["--unset", "time.speed"]).stderr(contains("the case has no such key"));
+    // A removed key has its default, and this one has none.
+    run(STUDY, &["--unset", "time.end"]).stderr(contains("end"));
     run(STUDY, &["--accept", "900fc4e"]).stderr(contains("900fc4e").and(contains("12 hexa")));
     grainwake()
         .args(["study", "nowhere.toml"])

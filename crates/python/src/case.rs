@@ -47,7 +47,8 @@ impl PyCase {
     ///     Case file in TOML.
     /// overrides : dict or sequence of str, optional
     ///     Values that replace those of the file, such as ``{"time.end": "0.5 s"}`` or
-    ///     ``{"grain.0.density": 2600}``, or the strings of ``--set``.
+    ///     ``{"grain.0.density": 2600}``; None removes a key, so that its default applies. Or
+    ///     the strings of ``--set``, and ``"-KEY"`` for ``--unset KEY``.
     ///
     /// Returns
     /// -------

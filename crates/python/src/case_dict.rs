@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use crate::error::{Raise, input, system};
 use crate::grain::PyGrain;
 
-/// Returns overrides as strings in the syntax of `--set`.
+/// Returns overrides as strings in the syntax of `Case::load`; None removes a key.
 pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<String>> {
     let Some(overrides) = overrides else {
         return Ok(Vec::new());
@@ -23,14 +23,16 @@ pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Strin
     let Ok(mapping) = overrides.cast::<PyMapping>() else {
         return overrides.extract();
     };
-    let mut set = Vec::new();
+    let (mut removed, mut set) = (Vec::new(), Vec::new());
     for item in mapping.items()?.iter() {
         let (key, given): (String, Bound<'_, PyAny>) = item.extract()?;
-        let value = value(&key, &given, None)?
-            .ok_or_else(|| input(format!("overrides: {key} is None; leave it out instead")))?;
-        set.push(format!("{key}={value}"));
+        match value(&key, &given, None)? {
+            Some(value) => set.push(format!("{key}={value}")),
+            None => removed.push(format!("-{key}")),
+        }
     }
-    Ok(set)
+    removed.append(&mut set);
+    Ok(removed)
 }
 
 /// Returns the tables as TOML. Grains are written to the folder `store`.

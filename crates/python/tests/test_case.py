@@ -56,6 +56,11 @@ def test_overrides_are_a_dict_or_strings(case_file):
     assert by_dict.end == 0.005
     position = gw.Case.load(case_file, {"grain.0.position": np.array([2e-3, 2e-3, 5e-3])})
     assert "0.005" in position.resolved
+    for removed in ({"fluid.viscosity": None, "fluid.kinematic_viscosity": 2e-6},
+                    ["-fluid.viscosity", "fluid.kinematic_viscosity=2e-6"]):
+        assert "kinematic_viscosity = 0.000002" in gw.Case.load(case_file, removed).resolved
+    with pytest.raises(gw.CaseError, match="no such key"):
+        gw.Case.load(case_file, {"time.speed": None})
     with pytest.raises(gw.CaseError, match="found a string"):
         gw.Case.load(case_file, "time.end=1")
 

@@ -28,6 +28,7 @@ mod watch;
 
 pub use error::{FailureKind, RunError};
 pub use job::{Job, Options};
+pub use memory::admit_memory;
 pub use plan::{Plane, PlanePosition, Probe, ProbePlace, RunPlan, Stop};
 pub use recording::Recording;
 pub use run_folder::{Existing, Parent, RESOLVED, checkpoint, lock, provenance};

@@ -49,8 +49,11 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
     bytes as u64
 }
 
-/// Refuses a run that needs more memory than is free.
-pub(crate) fn admit(setup: &Setup) -> Result<(), RunError> {
+/// Compares the memory of a simulation with the memory that is free.
+///
+/// # Errors
+/// [`RunError::Memory`] with both figures.
+pub fn admit_memory(setup: &Setup) -> Result<(), RunError> {
     let needed = needed(setup);
     match available_memory() {
         Some(free) if needed > free => Err(RunError::Memory { needed, free }),

@@ -210,7 +210,7 @@ impl Recording {
         options: &Options,
         note: &mut dyn FnMut(&str),
     ) -> Result<(Simulation, Recording), RunError> {
-        crate::memory::admit(&job.setup)?;
+        crate::memory::admit_memory(&job.setup)?;
         let opened = Opened::new(job, out, options)?;
         if opened.finished(job, note)?.is_some() {
             let what = format!("{} holds a finished run", out.display());

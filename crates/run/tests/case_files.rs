@@ -8,6 +8,7 @@ use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::{Plane, PlanePosition};
 use grainwake_solver::dem::{ContactLawKind, Material, MotionConstraint, surface_gap};
 use grainwake_solver::flow::Boundary;
+use grainwake_solver::immersed::Start;
 use grainwake_solver::sim::StepRule;
 
 /// The paper's pair (section 3.2.2) with spheres.
@@ -941,6 +942,18 @@ position = ["30 mm", "10 mm", "22 mm"]
 [time]
 end = "0.2 s"
 "#;
+
+#[test]
+fn a_grain_starts_impulsively_or_released() {
+    let [default, impulsive, released] = ["", "start = \"impulsive\"", "start = \"released\""]
+        .map(|line| good(&format!("{PAIR}\n[coupling]\n{line}\n")));
+    assert_eq!(default.setup.start, Start::Impulsive);
+    // Checkpoints of cases without the key go on matching.
+    assert_eq!(default.digest, impulsive.digest);
+    assert_eq!(released.setup.start, Start::Released);
+    assert_ne!(released.digest, default.digest);
+    assert!(released.resolved.contains("start = \"released\""));
+}
 
 #[test]
 fn hertz_mindlin_takes_materials_from_the_grain_or_from_contact() {

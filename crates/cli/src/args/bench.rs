@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use grainwake_solver::math::{InstructionSet, Precision};
 
+use super::Overrides;
+
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
@@ -12,9 +14,9 @@ pub struct BenchArgs {
     #[arg(value_name = "CASE.toml", conflicts_with_all = ["size", "grains", "scheme", "precision",
         "scaling"])]
     pub case: Option<PathBuf>,
-    /// Override a key of the case, as in `run`
-    #[arg(long, value_name = "KEY=VALUE", requires = "case")]
-    pub set: Vec<String>,
+    /// Changes of the case.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Number of cells along x, y and z
     #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
     pub size: Vec<usize>,

@@ -3,6 +3,7 @@
 mod bench;
 mod grain;
 mod man;
+mod overrides;
 mod report;
 mod run;
 mod study;
@@ -20,6 +21,7 @@ pub use grain::{
     InfoArgs, NewGrain,
 };
 pub use man::ManArgs;
+pub use overrides::Overrides;
 pub use report::ReportArgs;
 pub use run::{CheckArgs, RunArgs};
 pub use study::StudyArgs;

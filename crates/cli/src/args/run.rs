@@ -3,6 +3,8 @@
 use clap::Args;
 use std::path::PathBuf;
 
+use super::Overrides;
+
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -27,12 +29,9 @@ pub struct RunArgs {
     /// example runs/heap@0.5
     #[arg(long, value_name = "DIR[@TIME]", conflicts_with = "resume")]
     pub from: Option<String>,
-    /// Override a value of the case, for example time.end=0.5 or grain.0.density=2600
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Remove a key of the case, so that its default applies, for example time.step; before --set
-    #[arg(long = "unset", value_name = "KEY")]
-    pub unset: Vec<String>,
+    /// Changes of the case.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Do not draw the figures and report.html at the end of the run
     #[arg(long)]
     pub no_report: bool,
@@ -52,12 +51,9 @@ pub struct CheckArgs {
     /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
-    /// Override a value of the case, for example time.end=0.5
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Remove a key of the case, so that its default applies; before --set
-    #[arg(long = "unset", value_name = "KEY")]
-    pub unset: Vec<String>,
+    /// Changes of the case.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Print a JSON object
     #[arg(long)]
     pub json: bool,

@@ -3,6 +3,8 @@
 use clap::Args;
 use std::path::PathBuf;
 
+use super::Overrides;
+
 /// Arguments of `study`.
 #[derive(Debug, Args)]
 pub struct StudyArgs {
@@ -26,9 +28,9 @@ pub struct StudyArgs {
     /// Print the planned work with its estimated time and memory, without running any
     #[arg(long)]
     pub dry_run: bool,
-    /// Override a value of every case, for example domain.cell_size="0.5 mm"
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    /// Changes of all cases.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Restart failed runs
     #[arg(long)]
     pub retry: bool,

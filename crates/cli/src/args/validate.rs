@@ -3,6 +3,8 @@
 use clap::Args;
 use std::path::PathBuf;
 
+use super::Overrides;
+
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
 pub struct ValidateArgs {
@@ -20,11 +22,11 @@ pub struct ValidateArgs {
     pub output: PathBuf,
     /// Add the results with their provenance to LEVEL.json and LEVEL.md in this folder, and draw
     /// the figures
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["set", "unset"])]
     pub save: Option<PathBuf>,
-    /// Override a value of every case, for example run.precision="f32"
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "save")]
-    pub set: Vec<String>,
+    /// Changes of all cases.
+    #[command(flatten)]
+    pub overrides: Overrides,
     /// Keep finished runs of the same case and program version, resume interrupted ones
     #[arg(long)]
     pub resume: bool,

@@ -43,7 +43,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let library = Library::open(args.suites.as_deref())?;
     let mut suites = chosen(library.suites.clone(), &args.names)?;
     for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
-        run.set.extend(args.set.iter().cloned());
+        run.set.extend(args.overrides.list());
     }
     let level = match args.level.as_str() {
         "full" => Level::Full,

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use grainwake_formats::summary::EndReason;
 use grainwake_run::case::quantity::Time;
-use grainwake_run::{Recording, Watch};
+use grainwake_run::{Recording, Watch, admit_memory};
 use grainwake_solver::sim::{SAME_TIME, Simulation};
 use pyo3::exceptions::PyBufferError;
 use pyo3::prelude::*;
@@ -215,6 +215,7 @@ impl PySimulation {
             }
             None => {
                 let setup = given.setup.clone();
+                admit_memory(&setup).raise()?;
                 (py.detach(|| pool.install(|| Simulation::new(setup))).raise()?, None)
             }
         };

@@ -38,7 +38,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::{Job, RunError, RunPlan, memory};
+use crate::{Job, RunPlan};
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_solver::sim::Setup;
 
@@ -136,14 +136,6 @@ impl Case {
     /// Returns whether the case file or an override gives a dotted key: "grain.1.gap_above".
     pub fn gives(&self, key: &str) -> bool {
         self.source.value_of(key).is_some()
-    }
-
-    /// Compares the memory of the run with the memory that is free.
-    ///
-    /// # Errors
-    /// [`RunError::Memory`] with both figures.
-    pub fn admit_memory(&self) -> Result<(), RunError> {
-        memory::admit(&self.setup)
     }
 
     /// Estimates a run on `threads` threads, with warnings.

@@ -8,16 +8,34 @@
 //! The faces inside the grains take the rigid velocity and the projection follows, in turns, until
 //! the faces hardly change. Faces in the band around the surface stay free: forced as well, they
 //! would drag along a layer of fluid.
+//!
+//! A released grain has no impulse from outside ([`Start::Released`]): what the projections pass on
+//! from the faces inside it to the fluid around it, it loses. Both then have the momentum of the
+//! given velocity.
 
 use super::forcing::ForcedFaces;
 use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, nearest_distance};
-use super::rigidity::sum_impulse;
+use super::rigidity::{Impulse, sum_impulse};
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
-use crate::dem::Grain;
+use crate::dem::{Grain, MotionConstraint};
 use crate::flow::{Flow, FlowMeasures};
-use crate::math::{Real, RigidVelocity};
+use crate::math::{Real, RigidVelocity, Vector6};
+use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Start of a grain that has a velocity relative to the fluid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// With the given velocity: an impulse from outside has set grain and fluid in motion.
+    #[default]
+    Impulsive,
+    /// Let go in the fluid with the given velocity: the fluid around the grain takes part of the
+    /// momentum at once, and the grain goes on more slowly.
+    Released,
+}
 
 /// Share of the first impulse at which the iteration ends.
 const TOLERANCE: f64 = 1e-3;
@@ -25,14 +43,23 @@ const TOLERANCE: f64 = 1e-3;
 const MAX_PROJECTIONS: usize = 50;
 
 impl<R: Real> ImmersedGrains<R> {
-    /// Sets the flow around the grains in motion, or to rest, as an impulsive start does; returns
-    /// the measures of the flow.
-    pub fn initialise(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> FlowMeasures {
+    /// Sets the flow around the grains in motion, or to rest; released grains get their new
+    /// velocities. Returns the measures of the flow.
+    pub fn initialise(
+        &mut self,
+        flow: &mut Flow<R>,
+        grains: &mut [Grain],
+        start: Start,
+    ) -> FlowMeasures {
         self.force_inside(grains);
+        let mut released: Vec<Released> = match start {
+            Start::Impulsive => Vec::new(),
+            Start::Released => grains.iter().map(Released::new).collect(),
+        };
         let mut first = None;
         for _ in 1..MAX_PROJECTIONS {
             flow.predicted.copy_from(&flow.velocity);
-            let impulse = self.impose_start(flow, grains);
+            let impulse = self.impose_start(flow, grains, &mut released);
             flow.velocity.copy_from(&flow.predicted);
             if impulse <= TOLERANCE * *first.get_or_insert(impulse) {
                 break;
@@ -56,17 +83,25 @@ impl<R: Real> ImmersedGrains<R> {
         });
     }
 
-    /// Gives the forced faces of the prediction the velocities of the grains; returns the magnitude
-    /// of the impulse that this takes [N s].
-    fn impose_start(&mut self, flow: &mut Flow<R>, grains: &[Grain]) -> f64 {
+    /// Gives the forced faces of the prediction the velocities of the grains, which change if they
+    /// are `released`; returns the magnitude of the impulse that this takes [N s].
+    fn impose_start(
+        &mut self,
+        flow: &mut Flow<R>,
+        grains: &mut [Grain],
+        released: &mut [Released],
+    ) -> f64 {
         let (known, predictions) = flow.prediction();
         let rest = RigidVelocity::default();
         let mut updates = std::mem::take(&mut self.updates);
         updates.clear();
         let mut square = 0.0;
-        for (immersed, grain) in self.grains.iter_mut().zip(grains) {
+        for (index, (immersed, grain)) in self.grains.iter_mut().zip(grains).enumerate() {
             let (density, forced) = (self.fluid_density, &mut immersed.forced);
             let impulse = sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
+            if let Some(released) = released.get_mut(index) {
+                released.lose(grain, &impulse, density);
+            }
             let velocity = grain.rigid_velocity();
             let [x, y, z, ..] = impulse.at(velocity);
             square += x * x + y * y + z * z;
@@ -77,6 +112,44 @@ impl<R: Real> ImmersedGrains<R> {
         self.impose_pending(flow, &updates);
         self.updates = updates;
         square.sqrt()
+    }
+}
+
+/// A released grain.
+struct Released {
+    given: RigidVelocity,
+    /// Impulse on the fluid around the grain so far [N s, N m s]; `None` before the first
+    /// projection.
+    passed_on: Option<Vector6>,
+}
+
+impl Released {
+    fn new(grain: &Grain) -> Released {
+        Released { given: grain.rigid_velocity(), passed_on: None }
+    }
+
+    /// Slows `grain` down by what the last projection has passed on to the fluid around it:
+    /// `impulse` would restore the momentum of the faces inside. Motions along prescribed degrees
+    /// of freedom stay.
+    ///
+    /// The added mass of a sphere makes the fixed point M V = M V_given - P converge for grains
+    /// that are lighter than the fluid too.
+    fn lose(&mut self, grain: &mut Grain, impulse: &Impulse, fluid_density: f64) {
+        let now = grain.rigid_velocity();
+        let Some(passed_on) = &mut self.passed_on else {
+            self.passed_on = Some([0.0; 6]);
+            return;
+        };
+        passed_on.iter_mut().zip(impulse.at(now)).for_each(|(sum, lost)| *sum += lost);
+        let with_added_mass = 1.0 + 0.5 * fluid_density / grain.density;
+        if grain.translation == MotionConstraint::Free {
+            let lost = DVec3::from_slice(&passed_on[..3]) / grain.mass();
+            grain.velocity += (self.given.linear - now.linear - lost) / with_added_mass;
+        }
+        if grain.rotation == MotionConstraint::Free {
+            let lost = grain.inertia().inverse() * DVec3::from_slice(&passed_on[3..]);
+            grain.angular_velocity += (self.given.angular - now.angular - lost) / with_added_mass;
+        }
     }
 }
 

@@ -57,6 +57,7 @@ mod tests;
 mod update;
 
 pub use geometry::narrow_band_bytes;
+pub use initial::Start;
 pub(crate) use open_sides::{Crossing, OpenSides};
 pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidityInput};

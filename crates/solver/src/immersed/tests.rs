@@ -40,7 +40,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
     let mut grains = grains();
     let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
-    immersed.initialise(&mut flow, &grains);
+    immersed.initialise(&mut flow, &mut grains, Start::Impulsive);
     let previous = grains
         .each_ref()
         .map(|grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() });

@@ -61,8 +61,8 @@ pub(super) trait Fluid: Send + Sync {
     fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()>;
 }
 
-/// Builds the fluid of a set-up at t = 0.
-pub(super) fn start(setup: &Setup, params: &FluidParams) -> Box<dyn Fluid> {
+/// Builds the fluid of a set-up at t = 0; released grains get their new velocities.
+pub(super) fn start(setup: &mut Setup, params: &FluidParams) -> Box<dyn Fluid> {
     match setup.precision {
         Precision::Single => Box::new(FluidOf::<f32>::start(setup, params)),
         Precision::Double => Box::new(FluidOf::<f64>::start(setup, params)),
@@ -80,14 +80,14 @@ impl<R: Real> FluidOf<R> {
         let grid = SampledGrid { mesh: self.flow.mesh(), boundaries: self.flow.boundaries() };
         Probe { velocity: &self.flow.velocity, grid }
     }
-    fn start(setup: &Setup, params: &FluidParams) -> FluidOf<R> {
+    fn start(setup: &mut Setup, params: &FluidParams) -> FluidOf<R> {
         let mut flow = Flow::new(&setup.mesh, setup.boundaries, params);
         if let Some(velocity) = &setup.prescription.initial_velocity {
             flow.start_from(|axis, at| velocity.component(axis, &at.to_array()));
         }
         let (density, nu) = (params.density, params.kinematic_viscosity);
         let mut grains = ImmersedGrains::new(&flow, setup.scheme, density, nu, &setup.grains);
-        let measures = grains.initialise(&mut flow, &setup.grains);
+        let measures = grains.initialise(&mut flow, &mut setup.grains, setup.start);
         FluidOf { flow, grains, measures }
     }
 }

@@ -104,7 +104,8 @@ impl GrainData {
 impl Simulation {
     /// Builds the simulation at t = 0. Grains that start with a velocity set the fluid in motion at
     /// once: it starts with the irrotational flow around them (its added mass), inside a grain with
-    /// the velocity of the grain.
+    /// the velocity of the grain. Released grains ([`Start`](crate::immersed::Start)) lose the
+    /// momentum that the fluid gains.
     ///
     /// # Errors
     /// [`SetupError::Inconsistent`] if values of the set-up contradict each other.
@@ -115,7 +116,7 @@ impl Simulation {
         let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
         let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
         let dynamics = ContactDynamics::new(contact, setup.enclosure());
-        let fluid = setup.fluid.map(|params| fluid::start(&setup, &params));
+        let fluid = setup.fluid.map(|params| fluid::start(&mut setup, &params));
         let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
         Ok(Simulation {
             dynamics,

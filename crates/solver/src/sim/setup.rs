@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::dem::{ContactParams, Enclosure, Grain, Side};
 use crate::flow::{Boundaries, Boundary, FluidParams};
 use crate::grid::Mesh;
-use crate::immersed::Scheme;
+use crate::immersed::{Scheme, Start};
 use crate::math::Precision;
 
 use super::Prescription;
@@ -56,6 +56,8 @@ pub struct Setup {
     pub precision: Precision,
     /// Coupling scheme.
     pub scheme: Scheme,
+    /// Start of grains that have a velocity relative to the fluid; by default impulsive.
+    pub start: Start,
     /// Gravity [m/s^2]; by default zero.
     pub gravity: DVec3,
     /// The grains at t = 0; during a run, in their present state.
@@ -85,6 +87,7 @@ impl Setup {
             fluid: None,
             precision: Precision::Double,
             scheme: Scheme::default(),
+            start: Start::default(),
             gravity: DVec3::ZERO,
             grains: Vec::new(),
             contact: ContactParams::default(),
@@ -110,6 +113,11 @@ impl Setup {
     /// Replaces the coupling scheme.
     pub fn with_scheme(mut self, scheme: Scheme) -> Setup {
         self.scheme = scheme;
+        self
+    }
+    /// Replaces the start of grains that have a velocity relative to the fluid.
+    pub fn with_start(mut self, start: Start) -> Setup {
+        self.start = start;
         self
     }
     /// Replaces gravity [m/s^2].

@@ -10,7 +10,7 @@ use crate::case::quantity::{
     Quantity, Rate, Stiffness, Velocity,
 };
 use grainwake_solver::dem::{ContactLawKind, ContactParams};
-use grainwake_solver::immersed::Scheme;
+use grainwake_solver::immersed::{Scheme, Start};
 
 /// The fluid.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -54,10 +54,24 @@ pub struct RawCoupling {
     /// `aperture` (smoothed ghost-Dirichlet drag) or `paper` (Patankar 2000, as the paper does).
     #[schemars(schema_with = "scheme_schema")]
     pub scheme: Located<Scheme>,
+    /// `impulsive` (a grain starts with its velocity, and the fluid around it is set in motion) or
+    /// `released` (the grain loses the momentum that the fluid gains).
+    // The default is not written, so that checkpoints of earlier versions still match their case.
+    #[serde(skip_serializing_if = "is_impulsive")]
+    #[schemars(schema_with = "start_schema")]
+    pub start: Located<Start>,
 }
 
 fn scheme_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "enum": [Scheme::Aperture, Scheme::Paper] })
+}
+
+fn is_impulsive(start: &Located<Start>) -> bool {
+    start.value == Start::Impulsive
+}
+
+fn start_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "enum": [Start::Impulsive, Start::Released] })
 }
 
 /// Contact law (Eqs 9-18).

@@ -136,6 +136,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         .with_fluid(fluid)
         .with_precision(raw.run.precision.value)
         .with_scheme(raw.coupling.scheme.value)
+        .with_start(raw.coupling.start.value)
         .with_gravity(gravity)
         .with_grains(grains)
         .with_contact(contact?)
