@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Checks the unsafe code. Each check is run alone by its name; without names all but `step` are.
 #
-#   .ci/sanitize.sh [memcheck] [address] [thread] [miri] [step]
+#   .ci/sanitize.sh [memcheck] [python] [address] [thread] [miri] [step]
 #
 # memcheck  valgrind on the release program with two small cases in both precisions, 2 threads
+# python    valgrind on the tests of simulations in the Python package, whose arrays show the memory
+#           of the solver; undefined values are left out, since the interpreter itself reports some
 # address   address sanitizer on the tests of crates/simd, with all instruction sets of the machine
 # thread    thread sanitizer on grains that share rows of faces: unit tests of the coupling, and the
 #           test `sharing` of crates/solver with up to 4 threads; then on a test that races on
@@ -12,12 +14,12 @@
 #           of fields
 # step      a step of two touching grains on 2 threads under Miri; about 12 min of CPU time
 #
-# A check whose tool is missing is skipped with a note. All but the first need a nightly toolchain,
-# `thread` its component rust-src too.
+# A check whose tool is missing is skipped with a note. All but the first two need a nightly
+# toolchain, `thread` its component rust-src too.
 # The fuzz target `checkpoint` steps whole simulations under the address sanitizer.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-[ $# -gt 0 ] || set -- memcheck address thread miri
+[ $# -gt 0 ] || set -- memcheck python address thread miri
 host="$(rustc -vV | sed -n 's/^host: //p')"
 export CARGO_INCREMENTAL=0
 
@@ -37,6 +39,23 @@ memcheck() {
   done
   rm -r "$out"
   echo "memcheck: no error"
+}
+
+python() {
+  command -v valgrind >/dev/null || { missing python "valgrind is not installed"; return; }
+  local work wall_time=test_the_lock_of_the_interpreter_is_released
+  work="$(mktemp -d)"
+  python3 -m venv "$work/venv"
+  "$work/venv/bin/pip" install -q 'maturin>=1.9,<2' pytest
+  PATH="$work/venv/bin:$PATH" maturin build --release --quiet \
+    -m crates/python/Cargo.toml -o "$work"
+  "$work/venv/bin/pip" install -q "$work"/grainwake-*.whl
+  PYTHONMALLOC=malloc valgrind --quiet --error-exitcode=99 --leak-check=no \
+    --undef-value-errors=no --suppressions=.ci/valgrind.supp \
+    "$work/venv/bin/python" -m pytest -q -p no:cacheprovider -k "not $wall_time" \
+    crates/python/tests/test_simulation.py
+  rm -r "$work"
+  echo "python: no error"
 }
 
 address() {
@@ -88,6 +107,7 @@ step() { miri_solver --test sharing; }
 for check in "$@"; do
   case "$check" in
     memcheck) memcheck ;;
+    python) python ;;
     address) address ;;
     thread) thread ;;
     miri) miri ;;
