@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, Problem, Verdict, find_parent};
+use grainwake_run::number_format::quantity;
 use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
@@ -65,7 +66,8 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     })??;
     match ending {
         Ending::Interrupted(time) => {
-            let message = format!("interrupted at t = {time:.6e} s; a checkpoint was written");
+            let message =
+                format!("interrupted at t = {}; a checkpoint was written", quantity(time, "s"));
             Err(Exit::with_help(
                 INTERRUPTED,
                 message,

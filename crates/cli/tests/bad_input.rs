@@ -80,7 +80,7 @@ fn a_grain_outside() {
     refused(
         "\"3 mm\"]",
         "\"0.5 mm\"]",
-        &["case.toml:21:12", "crosses a side", "lower z", "0.5000 mm along z"],
+        &["case.toml:21:12", "crosses a side", "lower z", "0.5 mm along z"],
     );
 }
 

@@ -82,6 +82,11 @@ impl EqualAspectFrame {
         path_data(&placed, closed)
     }
 
+    /// Returns closed loops as one path; a loop inside another that turns the other way is a hole.
+    pub fn paths(&self, loops: &[Vec<(f64, f64)>]) -> String {
+        loops.iter().map(|points| self.path(points, true)).collect()
+    }
+
     /// Begins clipping to the frame.
     pub fn clip(&self, drawing: &mut Drawing, name: &str) {
         let (x, y) = self.corner;

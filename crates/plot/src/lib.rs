@@ -28,4 +28,4 @@ pub use axis::minus;
 pub use drawing::Drawing;
 pub use figure::Figure;
 pub use style::COLUMN;
-pub use text::{letter, literal, plain};
+pub use text::{letter, lettered, literal, plain};

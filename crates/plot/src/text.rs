@@ -73,6 +73,16 @@ pub fn letter(i: usize) -> String {
     format!("({})", char::from(b'a' + (i % 26) as u8))
 }
 
+/// Joins sentences on the panels of a figure, each after the letter of its panel. A single panel
+/// has no letter.
+pub fn lettered(sentences: &[String]) -> String {
+    if let [one] = sentences {
+        return one.clone();
+    }
+    let each = sentences.iter().enumerate().map(|(i, text)| format!("{} {text}", letter(i)));
+    each.collect::<Vec<_>>().join(" ")
+}
+
 /// Escapes the five reserved characters of XML; removes control characters.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());

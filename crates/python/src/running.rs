@@ -10,6 +10,7 @@ use std::time::Duration;
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, find_parent};
+use grainwake_run::number_format::quantity;
 use grainwake_run::{Ending, Existing, Observer, Options, Parent, Progress};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -166,7 +167,7 @@ pub fn run(
         (_, Some(error)) => Err(error),
         (Ending::Finished(summary) | Ending::AlreadyFinished(summary), None) => Ok(summary),
         (Ending::Interrupted(time), None) => {
-            Err(PyKeyboardInterrupt::new_err(format!("interrupted at t = {time:.6e} s")))
+            Err(PyKeyboardInterrupt::new_err(format!("interrupted at t = {}", quantity(time, "s"))))
         }
     }
 }

@@ -115,8 +115,10 @@ pub fn thumbnail(run: &RunFolder) -> Option<Thumbnail> {
             // other grain.
             let wrapped = run.wrapped(run.grains[grain].position[row]);
             let shift = position - wrapped;
-            let points = scene.outline(grain, row, across, up).into_iter();
-            let path = square.path(points.map(|(x, y)| (x + shift[across], y + shift[up])), "Z");
+            let outlines = scene.outlines(grain, row, across, up).into_iter();
+            let shifted = |(x, y): (f64, f64)| (x + shift[across], y + shift[up]);
+            let path =
+                outlines.map(|ring| square.path(ring.into_iter().map(shifted), "Z")).collect();
             Drawn { colour: colour(grain), path }
         };
         let trail = |&(grain, row, position): &(usize, usize, DVec3)| {

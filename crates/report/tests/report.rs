@@ -507,3 +507,23 @@ fn grains_that_do_not_turn_have_no_angular_speed() {
     assert!(seen.contains("long axis  [°]") && !seen.contains("ω"), "{seen}");
     remove(&folder);
 }
+
+#[test]
+fn a_grain_that_moves_sideways_shows_its_horizontal_speed() {
+    let folder = synthetic::folder("single");
+    synthetic::single(&folder);
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    // The velocity is turned to x, with round-off along z.
+    let turned = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if cells[0] != "time" {
+            cells[5] = std::mem::replace(&mut cells[7], "1e-12".into());
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(turned).collect::<String>()).unwrap();
+    let seen = text_of(&svg(&render(&folder).unwrap(), "velocity"));
+    assert!(seen.contains("|vh|  [m/s]") && !seen.contains("vz"), "{seen}");
+    remove(&folder);
+}

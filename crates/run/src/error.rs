@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::number_format::size;
+use crate::number_format::{quantity, size};
 use grainwake_solver::sim::{RemedyTerms, SetupError, StepError};
 
 /// Kind of a failure, from the mildest to the worst.
@@ -40,7 +40,7 @@ pub enum RunError {
         process: Option<u32>,
     },
     /// The numerics failed, or grains overlap too far.
-    #[error("{}\nThe last good checkpoint, at t = {time:.6e} s, is kept in {}", source.message(terms), folder.display())]
+    #[error("{}\nThe last good checkpoint, at t = {}, is kept in {}", source.message(terms), quantity(*time, "s"), folder.display())]
     Unstable {
         /// Symptom.
         source: StepError,

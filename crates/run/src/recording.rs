@@ -11,6 +11,7 @@ use grainwake_solver::sim::{Remedy, RemedyTerms, SAME_TIME, Simulation, StepErro
 use crate::error::{Context, RunError};
 use crate::job::{Job, Options};
 use crate::meter::Meter;
+use crate::number_format::quantity;
 use crate::plan::RunPlan;
 use crate::recorder::Recorder;
 use crate::run_folder::checkpoint::Record;
@@ -74,7 +75,8 @@ impl Opened {
         if from >= to * (1.0 - SAME_TIME) || summary.ended_by != EndReason::End {
             return Ok(Some(summary));
         }
-        note(&format!("the run had ended at t = {from:.6e} s; going on to {to:.6e} s"));
+        let [from, to] = [from, to].map(|time| quantity(time, "s"));
+        note(&format!("the run had ended at t = {from}; going on to {to}"));
         Ok(None)
     }
 
@@ -155,7 +157,7 @@ fn begin(
 ) -> Result<Begin, RunError> {
     if let Some(record) = own {
         let (time, steps) = (record.time, record.steps);
-        note(&format!("resuming at t = {time:.6e} s, step {steps}"));
+        note(&format!("resuming at t = {}, step {steps}", quantity(time, "s")));
         return Ok(Begin::Resumed(Box::new(record)));
     }
     let Some(parent) = parent else {
@@ -166,7 +168,7 @@ fn begin(
     };
     let record = parent.restore(sim)?;
     let (folder, time, steps) = (parent.folder().display(), record.time, record.steps);
-    note(&format!("starting from {folder} at t = {time:.6e} s, step {steps}"));
+    note(&format!("starting from {folder} at t = {}, step {steps}", quantity(time, "s")));
     Ok(Begin::Branched(Box::new(record)))
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use grainwake_run::case::Case;
+use grainwake_run::number_format::quantity;
 use grainwake_run::{Options, Recording, RunError, Watch};
 use grainwake_solver::sim::{Simulation, StepError};
 use pyo3::prelude::*;
@@ -26,7 +27,8 @@ pub(super) enum Failure {
     Run(#[from] RunError),
     /// The case ends at this time [s].
     #[error(
-        "the case ends at t = {0:.6e} s, and its run folder records nothing later: give it a later end"
+        "the case ends at t = {}, and its run folder records nothing later: give it a later end",
+        quantity(*.0, "s")
     )]
     End(f64),
 }

@@ -4,7 +4,7 @@ use grainwake_formats::events::EventKind;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::stacked::{Panel, Series};
 use grainwake_plot::style;
-use grainwake_plot::{Figure, letter};
+use grainwake_plot::{Figure, lettered};
 
 use super::scene::Scene;
 use crate::features::{galileo, short};
@@ -91,6 +91,11 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
     Some(scene.with_events("velocity", "Velocity of the grains", caption, &panels))
 }
 
+/// Part of the largest speed below which a component of the velocity is round-off.
+const ROUND_OFF: f64 = 1e-6;
+/// Part of the largest speed above which a horizontal motion is drawn.
+const SIDEWAYS: f64 = 0.05;
+
 /// Draws the velocity of one grain in m/s, relative to sqrt(d g), and as a Reynolds number.
 pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     let grain = *scene.moving().first()?;
@@ -98,32 +103,44 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
     let curve =
         |value: &dyn Fn(&History, usize) -> f64| Series { name: None, ..scene.curve(grain, value) };
     let vertical = curve(&|h, row| h.velocity[row].dot(up));
-    let points = vertical.points.iter().copied();
-    let peak = points.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let mut caption = format!(
-        "(a) Vertical velocity (down is negative); the largest is {} m/s at *t* = {} s.",
-        short(peak.1),
-        short(peak.0)
-    );
-    let mut panels = vec![Panel::linear("*v*_{z}  [m/s]", vec![vertical], &[0.0], 100.0)];
-    if let Some(scales) = scene.features.scales {
-        let scaled = curve(&|h, row| h.velocity[row].dot(up) / scales.velocity());
-        let label = "*v*_{z} / √(*d* *g*)  [–]";
-        panels.push(Panel::linear(label, vec![scaled], &[0.0], 65.0));
-        caption += " (b) Vertical velocity divided by √(d g).";
+    let horizontal = curve(&|h, row| h.velocity[row].reject_from_normalized(up).length());
+    let largest = |curve: &Series| {
+        let points = curve.points.iter().copied();
+        points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    };
+    let (peak, sideways) = (largest(&vertical)?, largest(&horizontal)?);
+    let fastest = peak.1.abs().max(sideways.1);
+    let mut panels = Vec::new();
+    let mut sentences = Vec::new();
+    if peak.1.abs() >= ROUND_OFF * fastest {
+        sentences.push(format!(
+            "Vertical velocity (down is negative); the largest is {} m/s at *t* = {} s.",
+            short(peak.1),
+            short(peak.0)
+        ));
+        panels.push(Panel::linear("*v*_{z}  [m/s]", vec![vertical], &[0.0], 100.0));
+        if let Some(scales) = scene.features.scales {
+            let scaled = curve(&|h, row| h.velocity[row].dot(up) / scales.velocity());
+            let label = "*v*_{z} / √(*d* *g*)  [–]";
+            panels.push(Panel::linear(label, vec![scaled], &[0.0], 65.0));
+            sentences.push("Vertical velocity divided by √(d g).".to_owned());
+        }
+    }
+    if sideways.1 > SIDEWAYS * fastest {
+        sentences.push(format!("Horizontal speed, up to {} m/s.", short(sideways.1)));
+        panels.push(Panel::linear("|*v*_{h}|  [m/s]", vec![horizontal], &[0.0], 65.0));
     }
     if let (Some(diameter), Some(viscosity)) = (facts.diameter(), facts.viscosity) {
         let reynolds = curve(&|h, row| h.velocity[row].length() * diameter / viscosity);
         let highest = short(reynolds.values().fold(0.0, f64::max));
-        caption += &format!(" {} Reynolds number, up to {highest}", letter(panels.len()));
         let label = "Re = |*v*| *d*/*ν*  [–]";
         panels.push(Panel::linear(label, vec![reynolds], &[0.0], 65.0));
-        caption += &match scene.features.scales.zip(facts.density_ratio()) {
-            Some((scales, ratio)) => {
-                format!(" (Galileo number {}).", short(galileo(scales, ratio, viscosity)))
-            }
-            None => ".".to_owned(),
-        };
+        let number = scene.features.scales.zip(facts.density_ratio());
+        let galileo = number.map_or(String::new(), |(scales, ratio)| {
+            format!(" (Galileo number {})", short(galileo(scales, ratio, viscosity)))
+        });
+        sentences.push(format!("Reynolds number, up to {highest}{galileo}."));
     }
+    let caption = lettered(&sentences);
     Some(scene.with_events("velocity", "Velocity of the grain", caption, &panels))
 }

@@ -17,8 +17,12 @@ pub type Outline = Vec<(f64, f64)>;
 /// Edge of a surface: two points, the lower index first.
 type Edge = (usize, usize);
 
-/// Resolution of the mask from which an outline is traced.
-const SAMPLES: usize = 72;
+/// Samples along the longer side of the mask from which an outline is traced: at least, at most.
+const SAMPLES: (f64, f64) = (62.0, 400.0);
+/// Samples across the thinnest part of a grain, if the most along the longer side allow it.
+const SAMPLES_ACROSS: f64 = 24.0;
+/// Empty samples around the mask.
+const EMPTY: f64 = 4.5;
 
 /// Closed triangulated surface of a grain, in the body frame.
 #[derive(Clone, Debug)]
@@ -27,13 +31,13 @@ pub struct GrainSurface {
     triangles: Vec<[usize; 3]>,
 }
 
-/// Principal axes of a grain, in the body frame.
+/// Principal axes of a grain, in the body frame; `None` where two axes are equal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrincipalAxes {
-    /// Axis of the longest extent.
-    pub long: DVec3,
-    /// Axis of the shortest extent: normal of the broad side.
-    pub short: DVec3,
+    /// Axis of the longest extent; a disc has none.
+    pub long: Option<DVec3>,
+    /// Axis of the shortest extent, normal of the broad side; a needle has none.
+    pub short: Option<DVec3>,
 }
 
 impl GrainSurface {
@@ -52,14 +56,23 @@ impl GrainSurface {
         &self.triangles
     }
 
-    /// Returns the outline of the body at a pose, projected to the axes `across` and `up`.
-    pub fn outline(&self, position: DVec3, rotation: DQuat, across: usize, up: usize) -> Outline {
+    /// Returns the outlines of the body at a pose, projected to the axes `across` and `up`: the
+    /// outer one, and those of its holes, which turn the other way.
+    pub fn outlines(
+        &self,
+        position: DVec3,
+        rotation: DQuat,
+        across: usize,
+        up: usize,
+    ) -> Vec<Outline> {
         let project = |p: &DVec3| {
             let x = position + rotation * *p;
             (x[across], x[up])
         };
         let points: Vec<(f64, f64)> = self.points.iter().map(project).collect();
-        largest_outline(&points, &self.triangles)
+        let thin = (0..3).filter_map(|axis| extent(self.points.iter().map(|p| p[axis])));
+        let thinnest = thin.map(|(low, high)| high - low).fold(f64::INFINITY, f64::min);
+        outlines(&points, &self.triangles, thinnest)
     }
 
     /// Returns the intersection of the body at a pose with the plane at `place` along the normal of
@@ -121,19 +134,23 @@ impl GrainSurface {
         self.triangles.iter().map(|t| t.map(|i| self.points[i]))
     }
 
-    /// Returns the axes of the largest and the smallest second moment of the volume; `None` if the
-    /// moments differ by less than 4 %, as of a sphere or a cube.
-    pub fn axes(&self) -> Option<PrincipalAxes> {
+    /// Returns the axes of the largest and the smallest second moment of the volume, each if it
+    /// differs by more than 1.5 % from the middle one.
+    pub fn axes(&self) -> PrincipalAxes {
         let mut moments = DVec3::ZERO;
         for [a, b, c] in self.corners() {
             let six_volumes = a.dot(b.cross(c));
             moments += six_volumes * (a * a + b * b + c * c + a * b + b * c + c * a) / 60.0;
         }
         let moments = moments.abs().to_array();
-        let by_size = |i: &usize, j: &usize| moments[*i].total_cmp(&moments[*j]);
-        let (long, short) = ((0..3).max_by(by_size)?, (0..3).min_by(by_size)?);
-        let clear = moments[long] > 1.04 * moments[short];
-        clear.then_some(PrincipalAxes { long: DVec3::AXES[long], short: DVec3::AXES[short] })
+        let mut order = [0, 1, 2];
+        order.sort_by(|i, j| moments[*i].total_cmp(&moments[*j]));
+        let [short, middle, long] = order;
+        let clear = |larger: usize, smaller: usize| moments[larger] > 1.015 * moments[smaller];
+        PrincipalAxes {
+            long: clear(long, middle).then_some(DVec3::AXES[long]),
+            short: clear(middle, short).then_some(DVec3::AXES[short]),
+        }
     }
 }
 
@@ -214,60 +231,82 @@ pub fn circle(centre: (f64, f64), radius: f64) -> Outline {
         .collect()
 }
 
-/// Returns the longest contour of the union of projected triangles, from a smoothed mask.
-fn largest_outline(points: &[(f64, f64)], triangles: &[[usize; 3]]) -> Outline {
+/// Returns the contours of the union of projected triangles, from a smoothed mask that resolves
+/// parts of the thickness `thinnest`.
+fn outlines(points: &[(f64, f64)], triangles: &[[usize; 3]], thinnest: f64) -> Vec<Outline> {
     let range = |pick: fn(&(f64, f64)) -> f64| extent(points.iter().map(pick));
     let (Some((x0, x1)), Some((y0, y1))) = (range(|p| p.0), range(|p| p.1)) else {
-        return Outline::new();
+        return Vec::new();
     };
-    let step = (x1 - x0).max(y1 - y0) / (SAMPLES as f64 - 10.0);
-    if !(step > 0.0 && step.is_finite()) {
-        return Outline::new();
+    let longer = (x1 - x0).max(y1 - y0);
+    if !(longer > 0.0 && longer.is_finite()) {
+        return Vec::new();
     }
-    let (x0, y0) = (x0 - 4.5 * step, y0 - 4.5 * step);
+    let step = (thinnest / SAMPLES_ACROSS).clamp(longer / SAMPLES.1, longer / SAMPLES.0);
+    let (x0, y0) = (x0 - EMPTY * step, y0 - EMPTY * step);
+    let samples = |low: f64, high: f64| ((high - low) / step + EMPTY).ceil() as usize + 1;
+    let mut mask = Mask::new(samples(x0, x1), samples(y0, y1));
     let local = points.iter().map(|(x, y)| ((x - x0) / step, (y - y0) / step));
     let local: Vec<(f64, f64)> = local.collect();
-    let mut mask = vec![0.0; SAMPLES * SAMPLES];
     for triangle in triangles {
-        paint(&mut mask, triangle.map(|i| local[i]));
+        mask.paint(triangle.map(|i| local[i]));
     }
-    let smooth = blur(&blur(&mask));
-    let loops = contour::closed_contours(SAMPLES, SAMPLES, |i, j| smooth[i + SAMPLES * j], 0.5);
-    let longest = loops.into_iter().max_by_key(Vec::len).unwrap_or_default();
+    let smooth = mask.blurred().blurred();
+    let loops = contour::closed_contours(smooth.nx, smooth.ny, |i, j| smooth.at(i, j), 0.5);
     let place = |(i, j): (f64, f64)| (x0 + i * step, y0 + j * step);
-    longest.into_iter().map(place).collect()
+    loops.into_iter().map(|ring| ring.into_iter().map(place).collect()).collect()
 }
 
-/// Sets the mask at the nodes inside a triangle.
-fn paint(mask: &mut [f64], [a, b, c]: [(f64, f64); 3]) {
-    let side = |p: (f64, f64), q: (f64, f64), x: f64, y: f64| {
-        (q.0 - p.0) * (y - p.1) - (q.1 - p.1) * (x - p.0)
-    };
-    let low = |p: f64, q: f64, r: f64| p.min(q).min(r).floor().max(0.0) as usize;
-    let high = |p: f64, q: f64, r: f64| (p.max(q).max(r).ceil().max(0.0) as usize).min(SAMPLES - 1);
-    for j in low(a.1, b.1, c.1)..=high(a.1, b.1, c.1) {
-        for i in low(a.0, b.0, c.0)..=high(a.0, b.0, c.0) {
-            let (x, y) = (i as f64, j as f64);
-            let sides = [side(a, b, x, y), side(b, c, x, y), side(c, a, x, y)];
-            if sides.iter().all(|s| *s >= -1e-9) || sides.iter().all(|s| *s <= 1e-9) {
-                mask[i + SAMPLES * j] = 1.0;
+/// Values at the nodes of a plane grid, x fastest: 1 inside the projection, 0 outside.
+struct Mask {
+    nx: usize,
+    ny: usize,
+    values: Vec<f64>,
+}
+
+impl Mask {
+    fn new(nx: usize, ny: usize) -> Mask {
+        Mask { nx, ny, values: vec![0.0; nx * ny] }
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.values[i + self.nx * j]
+    }
+
+    /// Sets the nodes inside a triangle.
+    fn paint(&mut self, [a, b, c]: [(f64, f64); 3]) {
+        let side = |p: (f64, f64), q: (f64, f64), x: f64, y: f64| {
+            (q.0 - p.0) * (y - p.1) - (q.1 - p.1) * (x - p.0)
+        };
+        let low = |p: f64, q: f64, r: f64| p.min(q).min(r).floor().max(0.0) as usize;
+        let high = |p: f64, q: f64, r: f64, count: usize| {
+            (p.max(q).max(r).ceil().max(0.0) as usize).min(count - 1)
+        };
+        for j in low(a.1, b.1, c.1)..=high(a.1, b.1, c.1, self.ny) {
+            for i in low(a.0, b.0, c.0)..=high(a.0, b.0, c.0, self.nx) {
+                let (x, y) = (i as f64, j as f64);
+                let sides = [side(a, b, x, y), side(b, c, x, y), side(c, a, x, y)];
+                if sides.iter().all(|s| *s >= -1e-9) || sides.iter().all(|s| *s <= 1e-9) {
+                    self.values[i + self.nx * j] = 1.0;
+                }
             }
         }
     }
-}
 
-/// Returns the mean over the 3 x 3 neighbours of each node; zero at the edge.
-fn blur(mask: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; mask.len()];
-    for j in 1..SAMPLES - 1 {
-        for i in 1..SAMPLES - 1 {
-            let at = i + SAMPLES * j;
-            let rows = [at - SAMPLES, at, at + SAMPLES];
-            let sums = rows.iter().map(|k| mask[k - 1] + mask[*k] + mask[k + 1]);
-            out[at] = sums.sum::<f64>() / 9.0;
+    /// Returns the mean over the 3 x 3 neighbours of each node; zero at the edge.
+    fn blurred(&self) -> Mask {
+        let mut out = Mask::new(self.nx, self.ny);
+        for j in 1..self.ny - 1 {
+            for i in 1..self.nx - 1 {
+                let at = i + self.nx * j;
+                let rows = [at - self.nx, at, at + self.nx];
+                let sums =
+                    rows.iter().map(|k| self.values[k - 1] + self.values[*k] + self.values[k + 1]);
+                out.values[at] = sums.sum::<f64>() / 9.0;
+            }
         }
+        out
     }
-    out
 }
 
 #[cfg(test)]
@@ -300,12 +339,52 @@ mod tests {
     fn outlines_have_the_size_of_the_body() {
         let body = block(2e-3, 1e-3, 0.5e-3);
         let at = DVec3::new(0.1, 0.2, 0.3);
-        let side = body.outline(at, DQuat::IDENTITY, 0, 2);
-        assert!((area(&side) / 4e-6 - 1.0).abs() < 0.03, "{}", area(&side));
-        let turned = body.outline(at, DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), 0, 2);
-        assert!((area(&turned) / 2e-6 - 1.0).abs() < 0.03, "{}", area(&turned));
+        let [side] = &body.outlines(at, DQuat::IDENTITY, 0, 2)[..] else { panic!("one outline") };
+        assert!((area(side) / 4e-6 - 1.0).abs() < 0.03, "{}", area(side));
+        let turned =
+            &body.outlines(at, DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2), 0, 2)[0];
+        assert!((area(turned) / 2e-6 - 1.0).abs() < 0.03, "{}", area(turned));
         let centre = side.iter().map(|p| p.0).sum::<f64>() / side.len() as f64;
         assert!((centre - 0.1).abs() < 1e-4);
+    }
+
+    /// A needle is thinner than a sample of a mask with a fixed number of samples.
+    #[test]
+    fn outlines_of_needles_have_their_thickness() {
+        let body = block(2e-3, 0.08e-3, 0.08e-3);
+        for turn in [0.0, 0.6] {
+            let rings = body.outlines(DVec3::ZERO, DQuat::from_rotation_y(turn), 0, 2);
+            assert_eq!(rings.len(), 1);
+            assert!((area(&rings[0]) / 0.64e-6 - 1.0).abs() < 0.05, "{}", area(&rings[0]));
+        }
+    }
+
+    #[test]
+    fn the_hole_of_a_frame_is_seen() {
+        // Four bars around a hole of 2 by 2.
+        let mut body = GrainSurface { points: Vec::new(), triangles: Vec::new() };
+        for (at, half) in [
+            (DVec3::new(0.0, 1.5, 0.0), [2.0, 0.5]),
+            (DVec3::new(0.0, -1.5, 0.0), [2.0, 0.5]),
+            (DVec3::new(1.5, 0.0, 0.0), [0.5, 1.0]),
+            (DVec3::new(-1.5, 0.0, 0.0), [0.5, 1.0]),
+        ] {
+            let (first, bar) = (body.points.len(), block(half[0], half[1], 0.5));
+            body.points.extend(bar.points.iter().map(|p| *p + at));
+            body.triangles.extend(bar.triangles.iter().map(|t| t.map(|i| first + i)));
+        }
+        let rings = body.outlines(DVec3::ZERO, DQuat::IDENTITY, 0, 1);
+        let mut areas: Vec<f64> = rings.iter().map(|ring| area(ring)).collect();
+        areas.sort_by(f64::total_cmp);
+        assert_eq!(areas.len(), 2, "{areas:?}");
+        assert!((areas[0] / 4.0 - 1.0).abs() < 0.05 && (areas[1] / 16.0 - 1.0).abs() < 0.05);
+        // They turn in opposite directions, so that a fill leaves the hole.
+        let turn = |ring: &Outline| -> f64 {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum()
+        };
+        assert!(turn(&rings[0]) * turn(&rings[1]) < 0.0);
+        assert_eq!(body.outlines(DVec3::ZERO, DQuat::IDENTITY, 0, 2).len(), 1);
     }
 
     #[test]
@@ -342,9 +421,15 @@ mod tests {
 
     #[test]
     fn axes_follow_the_extents() {
-        let axes = block(1.0, 3.0, 2.0).axes().unwrap();
-        assert_eq!((axes.long, axes.short), (DVec3::Y, DVec3::X));
-        assert!(block(1.0, 1.0, 1.0).axes().is_none());
+        let axes = |a, b, c| {
+            let PrincipalAxes { long, short } = block(a, b, c).axes();
+            (long, short)
+        };
+        assert_eq!(axes(1.0, 3.0, 2.0), (Some(DVec3::Y), Some(DVec3::X)));
+        assert_eq!(axes(1.0, 1.0, 1.0), (None, None));
+        // A needle has no short axis, a plate no long one.
+        assert_eq!(axes(1.0, 1.0, 9.0), (Some(DVec3::Z), None));
+        assert_eq!(axes(1.0, 9.0, 9.0), (None, Some(DVec3::X)));
         let diameter = block(1.0, 3.0, 2.0).diameter().unwrap();
         assert!((diameter - (6.0 * 48.0 / std::f64::consts::PI).cbrt()).abs() < 1e-12);
     }
@@ -352,7 +437,7 @@ mod tests {
     #[test]
     fn flat_or_empty_bodies_have_no_outline() {
         let body = GrainSurface { points: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2]] };
-        assert!(body.outline(DVec3::ZERO, DQuat::IDENTITY, 0, 2).is_empty());
+        assert!(body.outlines(DVec3::ZERO, DQuat::IDENTITY, 0, 2).is_empty());
         assert_eq!(circle((1.0, 2.0), 0.5).len(), 48);
     }
 }

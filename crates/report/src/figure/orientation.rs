@@ -1,9 +1,9 @@
 //! Orientation and angular speed of the grains against time.
 
 use glam::DVec3;
-use grainwake_plot::Figure;
 use grainwake_plot::axis::Axis;
 use grainwake_plot::stacked::{Panel, Series};
+use grainwake_plot::{Figure, lettered};
 
 use super::grain_surface::PrincipalAxes;
 use super::scene::Scene;
@@ -27,24 +27,34 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
     let moving = scene.moving();
     let up = scene.features.up;
     let angle = |axis: DVec3| axis.dot(up).abs().min(1.0).acos().to_degrees();
-    let known = moving.iter().filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()?)));
-    let axes: Vec<(usize, PrincipalAxes)> = known.collect();
+    let axes: Vec<(usize, PrincipalAxes)> =
+        moving.iter().filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()))).collect();
     let mut panels = Vec::new();
-    let mut caption = String::new();
-    if !axes.is_empty() {
-        let panel = |label: &str, pick: fn(&PrincipalAxes) -> DVec3| {
-            let curve = |(grain, axes): &(usize, PrincipalAxes)| {
-                scene.curve(*grain, |h, row| angle(h.orientation[row] * pick(axes)))
-            };
-            let curves = axes.iter().map(curve).collect();
-            Panel::with_axis(Axis::degrees(label, 0.0, 90.0), curves, 70.0)
-        };
-        panels.push(panel("long axis  [°]", |axes| axes.long));
-        panels.push(panel("short axis  [°]", |axes| axes.short));
-        caption += "(a) Angle of the longest axis with the vertical and (b) of the shortest axis, \
-                    the normal of the broad side: 0° in (b) is a grain that falls broad side \
-                    first.";
-    } else if scene.surfaces.is_empty() && !moving.iter().all(|g| scene.run.facts.is_sphere(*g)) {
+    let mut sentences = Vec::new();
+    let angles: [(_, fn(&PrincipalAxes) -> Option<DVec3>, _); 2] = [
+        (
+            "long axis  [°]",
+            |axes| axes.long,
+            "Angle of the longest axis with the vertical; 90° is a grain that lies flat.",
+        ),
+        (
+            "short axis  [°]",
+            |axes| axes.short,
+            "Angle of the shortest axis, the normal of the broad side, with the vertical; 0° is a \
+             grain that falls broad side first.",
+        ),
+    ];
+    for (label, pick, sentence) in angles {
+        let with_axis = axes.iter().filter_map(|(grain, axes)| Some((*grain, pick(axes)?)));
+        let curve = |(grain, axis)| scene.curve(grain, |h, row| angle(h.orientation[row] * axis));
+        let curves: Vec<Series> = with_axis.map(curve).collect();
+        if !curves.is_empty() {
+            panels.push(Panel::with_axis(Axis::degrees(label, 0.0, 90.0), curves, 70.0));
+            sentences.push(sentence.to_owned());
+        }
+    }
+    let angles = !panels.is_empty();
+    if scene.surfaces.is_empty() && !moving.iter().all(|g| scene.run.facts.is_sphere(*g)) {
         let note = "the axes of the grains are not drawn: there are no surfaces in grains/";
         notes.push(note.to_owned());
     }
@@ -59,15 +69,14 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         let speed = |grain| scene.curve(grain, |h, row| h.angular_velocity[row].length() / scale);
         let speeds: Vec<Series> = moving.iter().map(|grain| speed(*grain)).collect();
         let fastest = short(speeds.iter().flat_map(Series::values).fold(0.0, f64::max));
-        caption += if panels.is_empty() { "" } else { " (c) " };
-        caption += &format!("Angular speed, up to {fastest}{unit}.");
+        sentences.push(format!("Angular speed, up to {fastest}{unit}."));
         panels.push(Panel::linear(label, speeds, &[0.0], 65.0));
     }
-    let title = match (axes.is_empty(), rotates) {
-        (true, false) => return None,
-        (true, true) => "Angular speed",
-        (false, true) => "Orientation and angular speed",
-        (false, false) => "Orientation",
+    let title = match (angles, rotates) {
+        (false, false) => return None,
+        (false, true) => "Angular speed",
+        (true, true) => "Orientation and angular speed",
+        (true, false) => "Orientation",
     };
-    Some(scene.with_events("orientation", title, caption, &panels))
+    Some(scene.with_events("orientation", title, lettered(&sentences), &panels))
 }

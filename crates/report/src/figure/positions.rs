@@ -98,11 +98,12 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
                 "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" \
                  stroke-linejoin=\"round\""
             );
-            let outline = scene.outline(grain, last(grain), h, v);
+            let outlines = scene.outlines(grain, last(grain), h, v);
             for (dx, dy) in scene.image_shifts(h, v) {
-                let image: Outline = outline.iter().map(|p| (p.0 + dx, p.1 + dy)).collect();
-                if is_seen(&image, window) {
-                    drawing.path(&frame.path(&image, true), &style);
+                let shifted = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dy)).collect();
+                let image: Vec<Outline> = outlines.iter().map(shifted).collect();
+                if image.iter().any(|ring| is_seen(ring, window)) {
+                    drawing.path(&frame.paths(&image), &style);
                 }
             }
         }

@@ -123,17 +123,17 @@ impl Scene<'_> {
         Some(points.collect())
     }
 
-    /// Returns the outline of a grain at a row of its history, projected to two axes: from its
-    /// surface if known, else a circle of equal volume.
-    pub fn outline(&self, grain: usize, row: usize, across: usize, up: usize) -> Outline {
+    /// Returns the outlines of a grain at a row of its history, projected to two axes: from its
+    /// surface if known, with those of its holes; else a circle of equal volume.
+    pub fn outlines(&self, grain: usize, row: usize, across: usize, up: usize) -> Vec<Outline> {
         let history = &self.run.grains[grain];
         let position = self.run.wrapped(history.position[row]);
         let body = self.surfaces.get(&grain);
-        let traced = body.map(|body| body.outline(position, history.orientation[row], across, up));
-        traced.filter(|outline| !outline.is_empty()).unwrap_or_else(|| {
+        let traced = body.map(|body| body.outlines(position, history.orientation[row], across, up));
+        traced.filter(|outlines| !outlines.is_empty()).unwrap_or_else(|| {
             let own = self.run.facts.grains.get(grain).and_then(|facts| facts.diameter);
             let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
-            grain_surface::circle((position[across], position[up]), 0.5 * diameter)
+            vec![grain_surface::circle((position[across], position[up]), 0.5 * diameter)]
         })
     }
 

@@ -132,8 +132,8 @@ fn draw_path(
     let colour = series_colour(scene.features.grain_rank(grain));
     let rows = scene.instants.iter().filter_map(|instant| history.nearest(instant.time));
     for (row, strength) in [(0, 0.35)].into_iter().chain(rows.map(|row| (row, 1.0))) {
-        let outline = frame.path(&scene.outline(grain, row, side, up), true);
-        drawing.path(&outline, &outline_style(colour, strength));
+        let outlines = frame.paths(&scene.outlines(grain, row, side, up));
+        drawing.path(&outlines, &outline_style(colour, strength));
     }
     // The path is interrupted where it crosses a periodic face.
     let jump = |axis: usize, a: f64, b: f64| {

@@ -101,8 +101,8 @@ impl View for SideFilm<'_> {
                 "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" \
                  stroke-linejoin=\"round\""
             );
-            let outline = self.scene.outline(grain, row, across, up);
-            drawing.path(&frame.path(&outline, true), &style);
+            let outlines = self.scene.outlines(grain, row, across, up);
+            drawing.path(&frame.paths(&outlines), &style);
         }
         drawing.end_clip();
         let (unit, _) = length_unit(window.width().max(window.height()));

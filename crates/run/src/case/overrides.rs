@@ -6,7 +6,7 @@ use toml::de::{DeArray, DeTable, DeValue};
 use super::error::Problem;
 
 /// Returns an override as TOML, "time.end=0.5" -> "time.end = 0.5". A value that is not TOML
-/// becomes a string.
+/// becomes a string, unless it begins as a table, an array or a string does.
 pub(super) fn override_line(item: &str) -> Result<String, Problem> {
     let usage = "write key=value, for example --set time.end=0.5 or --set grain.0.density=2600";
     let (key, value) = item
@@ -20,8 +20,15 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
         return Err(Problem::new(format!("--set {item}: `{key}` is not a key")).help(usage));
     }
     let as_toml = format!("{key} = {value}");
-    if !value.is_empty() && !value.contains('\n') && DeTable::parse(&as_toml).is_ok() {
-        return Ok(as_toml);
+    if !value.is_empty() && !value.contains('\n') {
+        match DeTable::parse(&as_toml) {
+            Ok(_) => return Ok(as_toml),
+            Err(error) if value.starts_with(['{', '[', '"', '\'']) => {
+                let message = format!("--set {item}: the value is not TOML: {}", error.message());
+                return Err(Problem::new(message).help("quote the whole argument in the shell"));
+            }
+            Err(_) => {}
+        }
     }
     let escaped: String = value.chars().flat_map(char::escape_default).collect();
     Ok(format!(

@@ -1,6 +1,7 @@
 //! Numbers with units: a bare number is SI, a string carries its unit ("2 mm").
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
@@ -121,11 +122,22 @@ impl<K: Kind> Notation for Quantity<K> {
     type List = Unsupported;
     type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
-        parse_quantity::<K>(word).and_then(Self::from_number)
-    }
-    fn from_number(number: f64) -> Result<Self, String> {
+        let number = parse_quantity::<K>(word)?;
         let refused = || format!("found {number}; expected {}", K::EXPECTED);
         (number.is_finite().then(|| Quantity::new(number))).ok_or_else(refused)
+    }
+    fn from_number(number: f64) -> Result<Self, String> {
+        if !number.is_finite() {
+            return Err(format!("found {number}; expected {}", K::EXPECTED));
+        }
+        // Degrees without a unit are the commonest mistake.
+        if K::SI == Angle::SI && number.abs() > TAU {
+            return Err(format!(
+                "found {number}, which is more than a turn in radians; write \"{number} deg\" for \
+                 degrees, or \"{number} rad\""
+            ));
+        }
+        Ok(Quantity::new(number))
     }
     fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
         let word = json_schema!({ "type": "string", "examples": [K::EXAMPLE] });

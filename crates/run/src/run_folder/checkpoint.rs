@@ -22,6 +22,7 @@ use super::tables::Lengths;
 use crate::contact_events::{ContactEvents, WallEvents};
 use crate::contact_work::ContactWork;
 use crate::error::{Context, RunError};
+use crate::number_format::quantity;
 use crate::overlaps::Overlaps;
 
 const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
@@ -222,8 +223,8 @@ pub(crate) fn restore(
             Ok(record) => {
                 for reason in &reasons {
                     note(&format!(
-                        "warning: {reason}; continuing from the checkpoint before it (t = {:.6e} s)",
-                        record.time
+                        "warning: {reason}; continuing from the checkpoint before it (t = {})",
+                        quantity(record.time, "s")
                     ));
                 }
                 return Ok(Some(record));

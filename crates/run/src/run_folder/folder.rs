@@ -12,6 +12,7 @@ use super::provenance::{self, ParentRun, Provenance};
 use super::tables;
 use super::vtk_output;
 use crate::error::{Context, RunError};
+use crate::number_format::quantity;
 
 /// Name of the case file with all defaults written out.
 pub const RESOLVED: &str = "case.resolved.toml";
@@ -162,10 +163,11 @@ pub(crate) fn start_lost(folder: &Path, parent: &ParentRun) -> RunError {
     let (time, from) = (parent.checkpoint_time, &parent.folder);
     RunError::Occupied {
         what: format!(
-            "{} holds a run that started from {from} at t = {time:.6e} s and has no checkpoint yet",
-            folder.display()
+            "{} holds a run that started from {from} at t = {} and has no checkpoint yet",
+            folder.display(),
+            quantity(time, "s")
         ),
-        remedy: format!("start it again with --from \"{from}@{time:e}\" --force"),
+        remedy: format!("start it again with --from \"{from}@{time}\" --force"),
     }
 }
 

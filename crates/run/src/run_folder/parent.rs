@@ -47,7 +47,7 @@ impl Parent {
                     faults.push(format!("{}: it belongs to another case", path.display()));
                 }
                 Ok((record, _)) if at.is_some_and(|at| record.time > at * (1.0 + SAME_TIME)) => {
-                    later.push(format!("{:.6e} s", record.time));
+                    later.push(format!("{} s", record.time));
                 }
                 Ok((record, _)) => {
                     for fault in &faults {
@@ -70,7 +70,7 @@ impl Parent {
                 later.reverse();
                 let times = later.join(", ");
                 let what =
-                    format!("has no checkpoint at or before {at:.6e} s: it has those at {times}");
+                    format!("has no checkpoint at or before {at} s: it has those at {times}");
                 let remedy = "give one of these times, or run it again with output.checkpoint_keep \
                               and output.checkpoint_steps, which keep more checkpoints";
                 none(what, remedy)

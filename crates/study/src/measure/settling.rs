@@ -189,7 +189,7 @@ impl GrainSettling {
         let elapsed = history.time[rows - 1] - history.time[0];
         let drift = |p: &DVec3| (*p - start).reject_from_normalized(up).length();
         let rotation = |q: &DQuat| history.orientation[0].angle_between(*q).to_degrees();
-        let long_axis = surfaces.get(&grain).and_then(GrainSurface::axes).map(|axes| axes.long);
+        let long_axis = surfaces.get(&grain).and_then(|surface| surface.axes().long);
         let tilt = |axis: DVec3| {
             let w = window.as_ref()?;
             let inside = (0..rows).filter(|i| (w.from..=w.to).contains(&history.time[*i]));

@@ -109,7 +109,7 @@ pub(super) fn check_faces(
             continue;
         }
         let face = [enclosure.lower, enclosure.upper][o.side][o.axis];
-        let (by, axis, side) = (distance(o.by), AXES[o.axis], SIDES[o.side]);
+        let (by, axis, side) = (length(o.by), AXES[o.axis], SIDES[o.side]);
         let what = if o.centroid { "lies outside the box" } else { "crosses a side of the box" };
         let message = format!(
             "grain {} {what}: it reaches {by} beyond the {side} {axis} side (at {})",
@@ -189,16 +189,4 @@ fn report_too_large(
     );
     let help = format!("scale it with equivalent_diameter, or make the box larger{unit}");
     check.fail(size, message, help);
-}
-
-/// Formats a length [m] with four digits or more.
-pub(super) fn distance(x: f64) -> String {
-    match x.abs() {
-        x if x >= 1.0 => length(x),
-        x if x >= 1e-6 => {
-            let decimals = (3.0 - (1e3 * x).log10().floor()).clamp(4.0, 6.0);
-            format!("{:.*} mm", decimals as usize, 1e3 * x)
-        }
-        x => format!("{:.4} nm", 1e9 * x),
-    }
 }

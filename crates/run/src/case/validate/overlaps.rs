@@ -2,11 +2,11 @@
 
 use glam::{DQuat, DVec3};
 
-use super::arrangement::{LISTED, Placement, distance};
+use super::arrangement::{LISTED, Placement};
 use super::check::Checker;
 use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
-use crate::number_format::number;
+use crate::number_format::{length, number};
 use grainwake_solver::dem::{
     Enclosure, Grain, Overlap, Partner, RelativeOverlap, initial_overlaps,
 };
@@ -36,7 +36,7 @@ pub(super) fn check_overlaps(
     if let (1.., Some(deepest)) = (more, deepest) {
         let message = format!(
             "{more} more pairs overlap at the start; the deepest overlap of all, by {}, is that of {}",
-            distance(deepest.depth),
+            length(deepest.depth),
             names(deepest)
         );
         check.fail(&placements[deepest.grain].span, message, help);
@@ -74,7 +74,7 @@ fn report(check: &mut Checker, placements: &[Placement], overlap: &Overlap, help
     let Partner::Grain(j) = overlap.partner else {
         return;
     };
-    let depth = distance(overlap.depth);
+    let depth = length(overlap.depth);
     if i == j {
         let message =
             format!("grain {i} touches its own image across the periodic box (by {depth})");

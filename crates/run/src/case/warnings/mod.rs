@@ -17,6 +17,8 @@ use grainwake_solver::sim::{Setup, StepRule};
 
 /// Number of steps that suggests a wrong unit.
 const ABSURD_STEPS: u64 = 100_000_000;
+/// Densities of grains that do not suggest a wrong unit [kg/m^3], from foam to osmium.
+const ORDINARY_DENSITIES: std::ops::RangeInclusive<f64> = 5.0..=25_000.0;
 /// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
 const ABSURD_REYNOLDS: f64 = 1e-4;
 
@@ -235,6 +237,18 @@ fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
             "{:.1e} steps of {} to the end are more than can be run: {cause}",
             e.steps as f64,
             quantity(e.time_step_s, "s")
+        ));
+    }
+    // Dimensionless cases have other gravities and a fluid of density 1.
+    let in_si = (9.0..10.5).contains(&setup.gravity.length())
+        && setup.fluid.is_none_or(|fluid| fluid.density != 1.0);
+    let odd = |grain: &Grain| in_si && !ORDINARY_DENSITIES.contains(&grain.density);
+    if let Some((index, grain)) = setup.grains.iter().enumerate().find(|(_, grain)| odd(grain)) {
+        let more = setup.grains.iter().skip(index + 1).filter(|grain| odd(grain)).count();
+        let others = if more == 0 { String::new() } else { format!(", {more} more like it") };
+        found.push(format!(
+            "grain {index} has a density of {}{others}: look at its unit, for example \"2.5 g/cm3\"",
+            quantity(grain.density, "kg/m3")
         ));
     }
     let falls = setup.gravity != DVec3::ZERO;

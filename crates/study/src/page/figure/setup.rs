@@ -36,11 +36,11 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
         true => (first, second),
         false => (second, first),
     };
-    let outlines = [trailing, leading].map(outline);
+    let loops = [trailing, leading].map(outlines);
     let whole = Window { low: (low.x, low.z), high: (high.x, high.z) };
     let scale = (0.40 * COLUMN / whole.width()).min(300.0 / whole.height());
     let overall = EqualAspectFrame { window: whole, corner: (34.0, TOP), scale };
-    let pair = pair_window(&outlines);
+    let pair = pair_window(&loops);
     let right = overall.corner.0 + overall.width() + 30.0;
     let zoom = ((COLUMN - right - 46.0) / pair.width()).min(overall.height() / pair.height());
     let detail = EqualAspectFrame { window: pair, corner: (right, TOP), scale: zoom };
@@ -53,8 +53,8 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
         drawing.line(&[(x + w, from), (right, to)], FAINT, HAIR, Some("2 2"));
     }
     for view in [&overall, &detail] {
-        for (outline, colour) in outlines.iter().zip([BLUE, VERMILION]) {
-            drawing.path(&view.path(outline, true), &outline_style(colour, 1.0));
+        for (outlines, colour) in loops.iter().zip([BLUE, VERMILION]) {
+            drawing.path(&view.paths(outlines), &outline_style(colour, 1.0));
         }
     }
     let (unit, _) = length_unit(whole.height());
@@ -63,7 +63,7 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
     let (width, height) = (detail.width(), detail.height());
     drawing.rectangle(right, TOP, width, height, &frame_style);
     // The gap between the lowest point of the upper grain and the highest of the lower one.
-    let heights = |i: usize| outlines[i].iter().map(|p| p.1);
+    let heights = |i: usize| loops[i].iter().flatten().map(|p| p.1);
     let bottom = heights(0).fold(f64::INFINITY, f64::min);
     let top = heights(1).fold(f64::NEG_INFINITY, f64::max);
     let middle = 0.5 * (pair.low.0 + pair.high.0);
@@ -96,8 +96,8 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
 }
 
 /// Window around both outlines, with a margin; at least 0.6 times as wide as the pair is high.
-fn pair_window(outlines: &[Outline; 2]) -> Window {
-    let points = || outlines.iter().flatten();
+fn pair_window(loops: &[Vec<Outline>; 2]) -> Window {
+    let points = || loops.iter().flatten().flatten();
     let low = |pick: fn(&(f64, f64)) -> f64| points().map(pick).fold(f64::INFINITY, f64::min);
     let high = |pick: fn(&(f64, f64)) -> f64| points().map(pick).fold(f64::NEG_INFINITY, f64::max);
     let (x0, x1, z0, z1) = (low(|p| p.0), high(|p| p.0), low(|p| p.1), high(|p| p.1));
@@ -107,8 +107,8 @@ fn pair_window(outlines: &[Outline; 2]) -> Window {
     Window { low: (middle - half, z0 - margin), high: (middle + half, z1 + margin) }
 }
 
-fn outline(grain: &Grain) -> Outline {
+fn outlines(grain: &Grain) -> Vec<Outline> {
     let (points, triangles) = grain.shape.surface_mesh();
     let triangles = triangles.iter().map(|t| t.map(|i| i as usize)).collect();
-    GrainSurface::new(points, triangles).outline(grain.pose.position, grain.pose.orientation, 0, 2)
+    GrainSurface::new(points, triangles).outlines(grain.pose.position, grain.pose.orientation, 0, 2)
 }
