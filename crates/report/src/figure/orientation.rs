@@ -13,6 +13,9 @@ use crate::run_folder::History;
 /// Smallest total rotation of a grain that is not round-off [rad].
 const SMALLEST_ROTATION: f64 = 1e-4;
 
+/// Choice of one axis of a grain.
+type Pick = fn(&PrincipalAxes) -> Option<DVec3>;
+
 /// Returns the integral of the angular speed over the history [rad].
 fn total_rotation(history: &History) -> f64 {
     let speed = |row: usize| history.angular_velocity[row].length();
@@ -31,15 +34,16 @@ pub fn figure(scene: &Scene, notes: &mut Vec<String>) -> Option<Figure> {
         moving.iter().filter_map(|g| Some((*g, scene.surfaces.get(g)?.axes()))).collect();
     let mut panels = Vec::new();
     let mut sentences = Vec::new();
-    let angles: [(_, fn(&PrincipalAxes) -> Option<DVec3>, _); 2] = [
+    let (long_axis, short_axis): (Pick, Pick) = (|axes| axes.long, |axes| axes.short);
+    let angles = [
         (
             "long axis  [°]",
-            |axes| axes.long,
+            long_axis,
             "Angle of the longest axis with the vertical; 90° is a grain that lies flat.",
         ),
         (
             "short axis  [°]",
-            |axes| axes.short,
+            short_axis,
             "Angle of the shortest axis, the normal of the broad side, with the vertical; 0° is a \
              grain that falls broad side first.",
         ),
