@@ -15,7 +15,7 @@
 # step      a step of two touching grains on 2 threads under Miri; about 12 min of CPU time
 #
 # A check whose tool is missing is skipped with a note. All but the first two need a nightly
-# toolchain, `thread` its component rust-src too.
+# toolchain, `thread` its component rust-src too; `python` downloads packages.
 # The fuzz target `checkpoint` steps whole simulations under the address sanitizer.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -56,14 +56,15 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
             admit_memory(&case.setup)?;
             return Ok(vec![measure::measure(case.setup, &steps)?]);
         }
-        let each = sizes.into_iter();
-        each.map(|cells| {
+        let setup = |cells| {
             let case = BenchCase { cells, grains: args.grains, scheme, precision: args.precision };
             let setup = case.setup()?;
             admit_memory(&setup)?;
-            measure::measure(setup, &steps)
-        })
-        .collect::<Result<_, Exit>>()
+            Ok(setup)
+        };
+        // No size is measured in vain.
+        let setups = sizes.into_iter().map(setup).collect::<Result<Vec<_>, Exit>>()?;
+        setups.into_iter().map(|setup| measure::measure(setup, &steps)).collect()
     })??;
     match (args.json, &measured[..]) {
         (true, [one]) => print(&serde_json::to_string(one)?),

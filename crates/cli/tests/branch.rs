@@ -181,6 +181,7 @@ fn what_a_checkpoint_fixes_may_not_differ() {
         ("grain.0.position.0=\"1.9 mm\"", "grain.0.position", "another position at the start"),
         ("grain.0.velocity=[0, 0, -1e-3]", "grain.0.velocity", "another velocity at the start"),
         ("fluid.initial_velocity=[0, 0, 1e-3]", "fluid.initial_velocity", "initial velocity"),
+        ("coupling.start=\"released\"", "coupling.start", "start of the grains"),
     ] {
         let done = run(&case, &child, &["--set", set, "--from", &parent_name]);
         let message = message(&done.code(2));

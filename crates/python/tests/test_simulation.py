@@ -64,6 +64,13 @@ def test_the_bits_do_not_depend_on_threads_and_on_python(case):
     assert (one.fluid_velocity("z") == two.fluid_velocity("z")).all()
 
 
+def test_a_simulation_beyond_the_memory_is_refused(case_file):
+    huge = {"domain.cell_size": None, "domain.cells": [4000, 4000, 4000], "domain.size": [1, 1, 1]}
+    case = gw.Case.load(case_file, huge)
+    with pytest.raises(gw.CaseError, match="GB of memory and .* are free"):
+        gw.Simulation(case)
+
+
 def test_fields_are_shown_without_a_copy(sim, case):
     nx, ny, nz = case.cells
     sim.advance_to("2 ms")

@@ -75,8 +75,7 @@ impl Opened {
         if from >= to * (1.0 - SAME_TIME) || summary.ended_by != EndReason::End {
             return Ok(Some(summary));
         }
-        let [from, to] = [from, to].map(|time| quantity(time, "s"));
-        note(&format!("the run had ended at t = {from}; going on to {to}"));
+        note(&format!("the run had ended at t = {from} s; going on to {to} s"));
         Ok(None)
     }
 

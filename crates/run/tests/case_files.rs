@@ -982,6 +982,8 @@ fn a_grain_starts_impulsively_or_released() {
     assert_eq!(released.setup.start, Start::Released);
     assert_ne!(released.digest, default.digest);
     assert!(released.resolved.contains("start = \"released\""));
+    let dry = good(&HERTZ.replace("[contact]", "[coupling]\nstart = \"released\"\n[contact]"));
+    assert!(dry.estimate(1).warnings.iter().any(|w| w.contains("coupling.start has no effect")));
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
-use grainwake_shape::Shape;
 use grainwake_shape::analytic::ellipsoid;
+use grainwake_shape::{Shape, ShapeOptions};
 use grainwake_solver::dem::{ContactParams, Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
@@ -880,23 +880,78 @@ fn a_moving_grain_starts_with_its_added_mass_in_the_fluid() {
 #[test]
 fn a_released_grain_shares_its_momentum_with_the_fluid() {
     let displaced = PI / 6.0;
-    for (density, bounds) in [(2.5, [0.03, 0.01]), (1.0, [0.06, 0.02]), (0.2, [0.12, 0.04])] {
+    // Ratios of 0.498 and 0.02 need a criterion that does not stop by chance.
+    for (density, bounds) in [
+        (2.5, [0.03, 0.01]),
+        (1.0, [0.06, 0.02]),
+        (0.5, [0.08, 0.03]),
+        (0.498, [0.08, 0.03]),
+        (0.2, [0.12, 0.04]),
+        (0.02, [0.14, 0.05]),
+    ] {
         for (cells, bound) in [8, 16].into_iter().zip(bounds) {
             let sim = start(cells, 0.01, density, Start::Released);
             let momentum = sim.diagnostics().momentum.x / (density * displaced);
             let grain = &sim.grains()[0];
             // A sphere with the added mass of half the displaced fluid.
             let error = grain.velocity.x * (density + 0.5) / density - 1.0;
+            // The faces inside have not quite the volume of the grain.
             assert!((momentum - 1.0).abs() < 0.008, "{density}, {cells} cells: {momentum}");
             assert!(error.abs() < bound, "{density}, {cells} cells: {error}");
-            // The faces inside are not quite symmetric.
-            let spin = grain.angular_velocity.length();
-            assert!(
-                spin < if cells == 8 { 0.05 } else { 0.01 },
-                "{density}, {cells} cells: {spin}"
-            );
+            assert_eq!(grain.angular_velocity, DVec3::ZERO);
         }
     }
+}
+
+/// A spheroid of axis ratio 2 that spins across its axis has an added moment of inertia; a sphere
+/// has none, and a grain that is held along some degrees of freedom keeps them.
+#[test]
+fn a_released_grain_shares_its_spin_with_the_fluid() {
+    let released = |shape: Shape, change: &dyn Fn(&mut Grain)| {
+        let mut grain = Grain::new(shape, 0.5).with_position(DVec3::new(2.52, 2.49, 2.51));
+        grain.angular_velocity = DVec3::new(0.0, 2.0, 0.0);
+        grain.velocity = DVec3::new(0.3, 0.0, 0.0);
+        change(&mut grain);
+        let case = setup([40; 3], 1.0 / 8.0, [PERIODIC; 3], 0.01, vec![grain]);
+        let sim = Simulation::new(case.with_start(Start::Released)).unwrap();
+        (sim.grains()[0].velocity, sim.grains()[0].angular_velocity)
+    };
+    let (velocity, spin) = released(Shape::sphere(0.5, 200), &|_| ());
+    assert_eq!(spin, DVec3::new(0.0, 2.0, 0.0));
+    assert!(velocity.x < 0.16, "{velocity}");
+    let options = ShapeOptions::default();
+    let spheroid = ellipsoid(1.0, 0.5, 0.5, &options).unwrap();
+    let (_, spin) = released(spheroid.clone(), &|_| ());
+    // Coefficient of the added inertia of Lamb (1932): 0.24 of that of the displaced fluid.
+    let expected = 2.0 * 0.5 / (0.5 + 0.24);
+    assert!((spin.y / expected - 1.0).abs() < 0.06, "{spin} for {expected}");
+    let held = |grain: &mut Grain| grain.rotation = MotionConstraint::Prescribed(DVec3::Y * 2.0);
+    let (velocity, spin) = released(spheroid, &held);
+    assert_eq!(spin, DVec3::new(0.0, 2.0, 0.0));
+    assert!(velocity.x < 0.25, "{velocity}");
+}
+
+/// A grain that moves with the fluid has nothing to share; one at rest beside a thrown one is set
+/// in motion, and their momentum is kept.
+#[test]
+fn released_grains_beside_others_and_in_a_stream() {
+    let mut pair = vec![
+        sphere(1.0, DVec3::new(2.0, 2.02, 2.01), 0.8),
+        sphere(1.0, DVec3::new(3.2, 2.01, 2.02), 2.0),
+    ];
+    pair[0].velocity = DVec3::X;
+    let case = setup([40, 32, 32], 1.0 / 8.0, [PERIODIC; 3], 0.01, pair);
+    let sim = Simulation::new(case.with_start(Start::Released)).unwrap();
+    let momentum = sim.diagnostics().momentum.x / (0.8 * PI / 6.0);
+    assert!((momentum - 1.0).abs() < 0.015, "{momentum}");
+    let [first, second] = [0, 1].map(|index| sim.grains()[index].velocity.x);
+    assert!((0.5..0.66).contains(&first) && (0.01..0.2).contains(&second), "{first} {second}");
+    let mut grain = sphere(1.0, DVec3::new(2.0, 2.02, 2.01), 0.5);
+    grain.velocity = DVec3::X;
+    let mut case = setup([32; 3], 1.0 / 8.0, [PERIODIC; 3], 0.01, vec![grain]);
+    case.fluid.as_mut().unwrap().initial_velocity = DVec3::X;
+    let sim = Simulation::new(case.with_start(Start::Released)).unwrap();
+    assert!((sim.grains()[0].velocity - DVec3::X).length() < 1e-9, "{}", sim.grains()[0].velocity);
 }
 
 /// Speed of a sphere of unit diameter, initial unit speed and `density` in a fluid of density 1, at

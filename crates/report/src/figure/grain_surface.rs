@@ -243,6 +243,9 @@ fn outlines(points: &[(f64, f64)], triangles: &[[usize; 3]], thinnest: f64) -> V
         return Vec::new();
     }
     let step = (thinnest / SAMPLES_ACROSS).clamp(longer / SAMPLES.1, longer / SAMPLES.0);
+    if step <= 0.0 {
+        return Vec::new();
+    }
     let (x0, y0) = (x0 - EMPTY * step, y0 - EMPTY * step);
     let samples = |low: f64, high: f64| ((high - low) / step + EMPTY).ceil() as usize + 1;
     let mut mask = Mask::new(samples(x0, x1), samples(y0, y1));
@@ -427,6 +430,9 @@ mod tests {
         };
         assert_eq!(axes(1.0, 3.0, 2.0), (Some(DVec3::Y), Some(DVec3::X)));
         assert_eq!(axes(1.0, 1.0, 1.0), (None, None));
+        // Moments 1.3 % and 1.7 % apart.
+        assert_eq!(axes(1.0, 1.0065, 9.0), (Some(DVec3::Z), None));
+        assert_eq!(axes(1.0, 1.0085, 9.0), (Some(DVec3::Z), Some(DVec3::X)));
         // A needle has no short axis, a plate no long one.
         assert_eq!(axes(1.0, 1.0, 9.0), (Some(DVec3::Z), None));
         assert_eq!(axes(1.0, 9.0, 9.0), (None, Some(DVec3::X)));

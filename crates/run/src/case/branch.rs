@@ -163,6 +163,10 @@ impl Differences<'_> {
             let message = "the initial velocity is not that of the parent run";
             self.report(&["fluid.initial_velocity", "fluid"], message, FROM_CHECKPOINT);
         }
+        if now.setup.start != before.setup.start {
+            let message = "the start of the grains is not that of the parent run";
+            self.report(&["coupling.start", "coupling"], message, FROM_CHECKPOINT);
+        }
     }
 }
 

@@ -20,15 +20,15 @@ pub(super) fn override_line(item: &str) -> Result<String, Problem> {
         return Err(Problem::new(format!("--set {item}: `{key}` is not a key")).help(usage));
     }
     let as_toml = format!("{key} = {value}");
-    if !value.is_empty() && !value.contains('\n') {
-        match DeTable::parse(&as_toml) {
-            Ok(_) => return Ok(as_toml),
-            Err(error) if value.starts_with(['{', '[', '"', '\'']) => {
-                let message = format!("--set {item}: the value is not TOML: {}", error.message());
-                return Err(Problem::new(message).help("quote the whole argument in the shell"));
-            }
-            Err(_) => {}
-        }
+    let like_toml = value.starts_with(['{', '[', '"', '\'']);
+    let parsed = DeTable::parse(&as_toml);
+    if parsed.is_ok() && !value.is_empty() && (like_toml || !value.contains('\n')) {
+        return Ok(as_toml);
+    }
+    if let (Err(error), true) = (parsed, like_toml) {
+        let message = format!("--set {item}: the value is not TOML: {}", error.message());
+        let help = "close all brackets and quotes; a shell needs the argument in single quotes";
+        return Err(Problem::new(message).help(help));
     }
     let escaped: String = value.chars().flat_map(char::escape_default).collect();
     Ok(format!(

@@ -9,9 +9,11 @@
 //! the faces hardly change. Faces in the band around the surface stay free: forced as well, they
 //! would drag along a layer of fluid.
 //!
-//! A released grain has no impulse from outside ([`Start::Released`]): what the projections pass on
-//! from the faces inside it to the fluid around it, it loses. Both then have the momentum of the
-//! given velocity.
+//! A released grain has no impulse from outside ([`Start::Released`]). It loses the impulse P that
+//! the projections take from the faces inside it, and has M V = M V_0 - P at the end. In a periodic
+//! box grain and fluid together then keep the momentum M V_0; walls and open sides take part of it.
+//! Irrotational flow exerts no torque on a sphere, so a sphere keeps its angular velocity; the
+//! faces inside it, which are not quite symmetric, would change it.
 
 use super::forcing::ForcedFaces;
 use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, nearest_distance};
@@ -22,6 +24,7 @@ use crate::dem::{Grain, MotionConstraint};
 use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Real, RigidVelocity, Vector6};
 use glam::DVec3;
+use grainwake_shape::Field;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -61,7 +64,9 @@ impl<R: Real> ImmersedGrains<R> {
             flow.predicted.copy_from(&flow.velocity);
             let impulse = self.impose_start(flow, grains, &mut released);
             flow.velocity.copy_from(&flow.predicted);
-            if impulse <= TOLERANCE * *first.get_or_insert(impulse) {
+            if impulse <= TOLERANCE * *first.get_or_insert(impulse)
+                && released.iter().all(Released::converged)
+            {
                 break;
             }
             flow.make_solenoidal();
@@ -99,12 +104,12 @@ impl<R: Real> ImmersedGrains<R> {
         for (index, (immersed, grain)) in self.grains.iter_mut().zip(grains).enumerate() {
             let (density, forced) = (self.fluid_density, &mut immersed.forced);
             let impulse = sum_impulse(&known, &predictions, density, forced, [rest; 2], 0.0);
+            let [x, y, z, ..] = impulse.at(grain.rigid_velocity());
+            square += x * x + y * y + z * z;
             if let Some(released) = released.get_mut(index) {
                 released.lose(grain, &impulse, density);
             }
             let velocity = grain.rigid_velocity();
-            let [x, y, z, ..] = impulse.at(velocity);
-            square += x * x + y * y + z * z;
             // The change has a weight only in a step.
             let pending = Some(PendingRigidity { velocity, change: rest });
             updates.push(GrainUpdate { pending, ..GrainUpdate::default() });
@@ -118,39 +123,73 @@ impl<R: Real> ImmersedGrains<R> {
 /// A released grain.
 struct Released {
     given: RigidVelocity,
-    /// Impulse on the fluid around the grain so far [N s, N m s]; `None` before the first
+    /// Impulse P on the fluid around the grain so far [N s, N m s]; `None` before the first
     /// projection.
     passed_on: Option<Vector6>,
+    /// Velocity relative to the fluid at first, with that of the surface [m/s].
+    relative_speed: f64,
+    /// Velocity of the grain that the last change was about, with that of the surface [m/s].
+    last_change: f64,
 }
 
 impl Released {
     fn new(grain: &Grain) -> Released {
-        Released { given: grain.rigid_velocity(), passed_on: None }
+        let given = grain.rigid_velocity();
+        Released { given, passed_on: None, relative_speed: 0.0, last_change: f64::INFINITY }
     }
 
-    /// Slows `grain` down by what the last projection has passed on to the fluid around it:
-    /// `impulse` would restore the momentum of the faces inside. Motions along prescribed degrees
-    /// of freedom stay.
+    /// Adds what the last projection has taken from the faces inside, which `impulse` would
+    /// restore, to P, and moves the velocity of `grain` towards V_0 - P / M. Prescribed degrees of
+    /// freedom and the angular velocity of a sphere stay.
     ///
-    /// The added mass of a sphere makes the fixed point M V = M V_given - P converge for grains
-    /// that are lighter than the fluid too.
+    /// The division by 1 + m_f / (2 M), with the displaced mass m_f, accounts for the added mass of
+    /// a sphere: without it the iteration would diverge for light grains.
     fn lose(&mut self, grain: &mut Grain, impulse: &Impulse, fluid_density: f64) {
         let now = grain.rigid_velocity();
+        let taken = impulse.at(now);
+        let speed = |velocity: RigidVelocity| {
+            velocity.linear.length() + velocity.angular.length() * grain.shape.bounding_radius()
+        };
+        let displaced = fluid_density / grain.density;
+        let last = free_change(grain, &taken);
         let Some(passed_on) = &mut self.passed_on else {
+            self.relative_speed = speed(last) / displaced;
             self.passed_on = Some([0.0; 6]);
             return;
         };
-        passed_on.iter_mut().zip(impulse.at(now)).for_each(|(sum, lost)| *sum += lost);
-        let with_added_mass = 1.0 + 0.5 * fluid_density / grain.density;
+        passed_on.iter_mut().zip(taken).for_each(|(sum, taken)| *sum += taken);
+        let lost = free_change(grain, passed_on);
+        let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
         if grain.translation == MotionConstraint::Free {
-            let lost = DVec3::from_slice(&passed_on[..3]) / grain.mass();
-            grain.velocity += (self.given.linear - now.linear - lost) / with_added_mass;
+            linear = self.given.linear - now.linear - lost.linear;
         }
         if grain.rotation == MotionConstraint::Free {
-            let lost = grain.inertia().inverse() * DVec3::from_slice(&passed_on[3..]);
-            grain.angular_velocity += (self.given.angular - now.angular - lost) / with_added_mass;
+            angular = self.given.angular - now.angular - lost.angular;
         }
+        // Both are small at the end; one alone may be small by chance.
+        self.last_change = speed(RigidVelocity { linear, angular }) + speed(last);
+        grain.velocity += linear / (1.0 + 0.5 * displaced);
+        grain.angular_velocity += angular / (1.0 + 0.5 * displaced);
     }
+
+    /// Returns whether M V + P is M V_0, within a part of the first relative momentum.
+    fn converged(&self) -> bool {
+        self.last_change <= TOLERANCE * self.relative_speed
+    }
+}
+
+/// Change of the velocities of a grain by an impulse. Prescribed degrees of freedom do not change,
+/// nor does the angular velocity of a sphere.
+fn free_change(grain: &Grain, impulse: &Vector6) -> RigidVelocity {
+    let mut change = RigidVelocity::default();
+    if grain.translation == MotionConstraint::Free {
+        change.linear = DVec3::from_slice(&impulse[..3]) / grain.mass();
+    }
+    let is_sphere = matches!(grain.shape.field(), Field::Sphere(_));
+    if grain.rotation == MotionConstraint::Free && !is_sphere {
+        change.angular = grain.inertia().inverse() * DVec3::from_slice(&impulse[3..]);
+    }
+    change
 }
 
 /// Forces the faces inside the grain alone, with full weight: those nearer to this grain than to

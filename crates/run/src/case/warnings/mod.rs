@@ -12,6 +12,7 @@ use crate::number_format::{AXES, SIDES, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
+use grainwake_solver::immersed::Start;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
@@ -239,9 +240,8 @@ fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
             quantity(e.time_step_s, "s")
         ));
     }
-    // Dimensionless cases have other gravities and a fluid of density 1.
-    let in_si = (9.0..10.5).contains(&setup.gravity.length())
-        && setup.fluid.is_none_or(|fluid| fluid.density != 1.0);
+    // Dimensionless cases have other gravities.
+    let in_si = (9.0..10.5).contains(&setup.gravity.length());
     let odd = |grain: &Grain| in_si && !ORDINARY_DENSITIES.contains(&grain.density);
     if let Some((index, grain)) = setup.grains.iter().enumerate().find(|(_, grain)| odd(grain)) {
         let more = setup.grains.iter().skip(index + 1).filter(|grain| odd(grain)).count();
@@ -282,6 +282,7 @@ fn ignored_in_dry_runs(setup: &Setup, plan: &RunPlan, expect: &[Expectation]) ->
         (plan.slices > 0.0, "output.slices"),
         (plan.fields > 0.0, "output.fields"),
         (expect.iter().any(of_flow), "expect.max_divergence"),
+        (setup.start != Start::default(), "coupling.start"),
     ];
     let requested = requests.into_iter().filter(|(requested, _)| *requested);
     let names: Vec<&str> = requested.map(|(_, name)| name).collect();
