@@ -218,4 +218,10 @@ fn a_damaged_plan_is_no_dead_end() {
     assert_eq!(provenance.matches("\"started\"").count(), 1, "the run was not repeated");
     let report = grainwake().arg("report").arg(&out).assert().success();
     report.stderr(contains("damaged").not());
+    std::fs::remove_file(out.join("study.json")).unwrap();
+    let report = grainwake().arg("report").arg(&out).assert().success();
+    report
+        .stderr(contains("the file is missing").and(contains("`grainwake study ")))
+        .stdout(contains("2 of 2 runs finished"));
+    run().stderr(contains("the file is missing").and(contains("finished runs are kept")));
 }

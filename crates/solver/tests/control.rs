@@ -1,12 +1,14 @@
 //! Control of grains between steps.
 
 use grainwake_solver::dem::Grain;
-use grainwake_solver::flow::FluidParams;
+use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::glam::DVec3;
-use grainwake_solver::grid::Mesh;
+use grainwake_solver::grid::{Axis, Mesh};
 use grainwake_solver::math::Load;
 use grainwake_solver::shape::Shape;
-use grainwake_solver::sim::{ControlError, MotionComponent, Setup, Simulation, StepRule};
+use grainwake_solver::sim::{
+    AnyFieldView, ControlError, MotionComponent, Setup, Simulation, StepRule,
+};
 
 const TRANSLATION: MotionComponent = MotionComponent::Translation;
 const ROTATION: MotionComponent = MotionComponent::Rotation;
@@ -135,4 +137,34 @@ fn unknown_grains_and_infinite_values_are_refused() {
     gone.grains[0].leave();
     let mut sim = Simulation::new(gone).unwrap();
     assert_eq!(sim.release(0, TRANSLATION), Err(ControlError::HasLeft { grain: 0 }));
+}
+
+/// A simulation restored in a box with other wall velocities sees them in its first step: its state
+/// is that of a simulation that had these walls from the start.
+#[test]
+fn a_restored_simulation_sees_the_velocities_of_its_walls() {
+    let walls = |speed: f64| {
+        let wall = |velocity: DVec3| Boundary::Wall { velocity };
+        let still = [wall(DVec3::ZERO); 2];
+        let [along_x, along_y] = [DVec3::X, DVec3::Y].map(|axis| speed * axis);
+        let boundaries =
+            [[wall(along_y); 2], [wall(along_x), wall(DVec3::ZERO)], [wall(along_x), still[1]]];
+        Simulation::new(setup().with_boundaries(boundaries)).unwrap()
+    };
+    let (mut moving, mut restored) = (walls(0.01), walls(0.01));
+    let still = state(&walls(0.0));
+    restored.restore(&mut &still[..]).unwrap();
+    for _ in 0..2 {
+        advance(&mut moving, 1);
+        advance(&mut restored, 1);
+        for axis in [Axis::X, Axis::Y, Axis::Z] {
+            let values = |sim: &Simulation| match sim.velocity(axis).unwrap() {
+                AnyFieldView::Double(view) => view.values().to_vec(),
+                AnyFieldView::Single(_) => unreachable!("double precision"),
+            };
+            let (one, two) = (values(&moving), values(&restored));
+            assert!(one == two, "the velocities differ along {axis:?}");
+            assert!(one.iter().any(|v| *v != 0.0));
+        }
+    }
 }

@@ -125,6 +125,18 @@ impl<R: Real> Flow<R> {
         self.make_solenoidal();
     }
 
+    /// Fills the ghosts of the velocity by the present conditions on the sides.
+    pub fn fill_ghosts(&mut self) {
+        let (layout, boundaries) = (self.mesh.layout(), &self.boundaries);
+        for component in 0..3 {
+            let planes = self.velocity.component_mut(component).chunks_exact_mut(layout.plane());
+            for plane in planes.skip(1).take(layout.cells[2]) {
+                boundaries.fill_ghosts_of_plane(layout, component, plane);
+            }
+        }
+        boundaries.fill_ghost_planes(&mut self.velocity);
+    }
+
     /// Sets the uniform acceleration that drives the flow [m/s^2].
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;

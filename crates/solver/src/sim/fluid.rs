@@ -183,6 +183,9 @@ where
             }
         }
         input.expect(sums.len(), "sums")?;
-        input.fill(sums)
+        input.fill(sums)?;
+        // The saved ghosts are those of the walls of the saved run, which may have moved otherwise.
+        self.flow.fill_ghosts();
+        Ok(())
     }
 }

@@ -203,9 +203,12 @@ impl Plan {
     /// Reads the plan of a study folder.
     ///
     /// # Errors
-    /// If the file is missing or damaged.
+    /// If the file is missing or damaged; in a folder with runs a missing file is damage.
     pub fn read(folder: &Path) -> Result<Plan, StudyError> {
         let file = folder.join(MANIFEST);
+        if !file.exists() && Plan::exists_in(folder) {
+            return Err(StudyError::Damaged { file, what: "the file is missing".into() });
+        }
         let text = std::fs::read(&file).at("read", &file)?;
         serde_json::from_slice(&text)
             .map_err(|error| StudyError::Damaged { file, what: error.to_string() })
@@ -216,8 +219,9 @@ impl Plan {
         write_json(&folder.join(MANIFEST), self)
     }
 
-    /// Returns whether a folder holds a study.
+    /// Returns whether a folder holds a study: its plan, or runs with their table.
     pub fn exists_in(folder: &Path) -> bool {
-        folder.join(MANIFEST).is_file()
+        let [plan, table] = [MANIFEST, TABLE].map(|name| folder.join(name).is_file());
+        plan || table && folder.join(RUNS).is_dir()
     }
 }

@@ -27,11 +27,11 @@ struct Entry {
 }
 
 impl Plan {
-    /// Reads the plan of a study folder. If `study.json` is damaged, the plan is put together from
-    /// the run folders and `table.json`, and a note says what is missing from it.
+    /// Reads the plan of a study folder. If `study.json` is damaged or missing, the plan is put
+    /// together from the run folders and `table.json`, and a note says what it lacks.
     ///
     /// # Errors
-    /// If `study.json` is missing, if it is damaged and no run is found, or if `table.json` is
+    /// If there is no study, if `study.json` is damaged and no run is found, or if `table.json` is
     /// damaged.
     pub fn read_or_rebuild(folder: &Path) -> Result<(Plan, Option<String>), StudyError> {
         let damage = match Plan::read(folder) {
