@@ -28,5 +28,5 @@ pub use material::Material;
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };
-pub(crate) use search::{BoundingSphere, BroadPhase};
+pub(crate) use search::{BoundingSphere, BroadPhase, is_sphere};
 pub use search::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};

@@ -20,11 +20,10 @@ use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, nearest_dista
 use super::rigidity::{Impulse, sum_impulse};
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
-use crate::dem::{Grain, MotionConstraint};
+use crate::dem::{Grain, MotionConstraint, is_sphere};
 use crate::flow::{Flow, FlowMeasures};
 use crate::math::{Real, RigidVelocity, Vector6};
 use glam::DVec3;
-use grainwake_shape::Field;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -126,16 +125,16 @@ struct Released {
     /// Impulse P on the fluid around the grain so far [N s, N m s]; `None` before the first
     /// projection.
     passed_on: Option<Vector6>,
-    /// Velocity relative to the fluid at first, with that of the surface [m/s].
+    /// Speed relative to the fluid at the start, rotation included [m/s].
     relative_speed: f64,
-    /// Velocity of the grain that the last change was about, with that of the surface [m/s].
-    last_change: f64,
+    /// Error of M V = M V_0 - P, and the last change of P, both as speeds [m/s].
+    error: f64,
 }
 
 impl Released {
     fn new(grain: &Grain) -> Released {
         let given = grain.rigid_velocity();
-        Released { given, passed_on: None, relative_speed: 0.0, last_change: f64::INFINITY }
+        Released { given, passed_on: None, relative_speed: 0.0, error: f64::INFINITY }
     }
 
     /// Adds what the last projection has taken from the faces inside, which `impulse` would
@@ -158,23 +157,16 @@ impl Released {
             return;
         };
         passed_on.iter_mut().zip(taken).for_each(|(sum, taken)| *sum += taken);
-        let lost = free_change(grain, passed_on);
-        let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
-        if grain.translation == MotionConstraint::Free {
-            linear = self.given.linear - now.linear - lost.linear;
-        }
-        if grain.rotation == MotionConstraint::Free {
-            angular = self.given.angular - now.angular - lost.angular;
-        }
-        // Both are small at the end; one alone may be small by chance.
-        self.last_change = speed(RigidVelocity { linear, angular }) + speed(last);
-        grain.velocity += linear / (1.0 + 0.5 * displaced);
-        grain.angular_velocity += angular / (1.0 + 0.5 * displaced);
+        let residual = self.given - now - free_change(grain, passed_on);
+        // One of them alone may be small by chance.
+        self.error = speed(residual) + speed(last);
+        grain.velocity += residual.linear / (1.0 + 0.5 * displaced);
+        grain.angular_velocity += residual.angular / (1.0 + 0.5 * displaced);
     }
 
-    /// Returns whether M V + P is M V_0, within a part of the first relative momentum.
+    /// Returns whether M V = M V_0 - P holds within the tolerance.
     fn converged(&self) -> bool {
-        self.last_change <= TOLERANCE * self.relative_speed
+        self.error <= TOLERANCE * self.relative_speed
     }
 }
 
@@ -185,8 +177,7 @@ fn free_change(grain: &Grain, impulse: &Vector6) -> RigidVelocity {
     if grain.translation == MotionConstraint::Free {
         change.linear = DVec3::from_slice(&impulse[..3]) / grain.mass();
     }
-    let is_sphere = matches!(grain.shape.field(), Field::Sphere(_));
-    if grain.rotation == MotionConstraint::Free && !is_sphere {
+    if grain.rotation == MotionConstraint::Free && !is_sphere(&grain.shape) {
         change.angular = grain.inertia().inverse() * DVec3::from_slice(&impulse[3..]);
     }
     change

@@ -184,7 +184,7 @@ where
         }
         input.expect(sums.len(), "sums")?;
         input.fill(sums)?;
-        // The saved ghosts are those of the walls of the saved run, which may have moved otherwise.
+        // The saved ghosts belong to the walls of the saved run, whose velocities may differ.
         self.flow.fill_ghosts();
         Ok(())
     }

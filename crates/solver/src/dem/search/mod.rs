@@ -16,6 +16,7 @@ mod surface;
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint};
 pub(super) use patch_tree::{PatchTree, PosedShape};
+pub(crate) use surface::is_sphere;
 
 use glam::{DVec3, IVec3};
 

@@ -138,7 +138,7 @@ impl SurfacePoint {
 }
 
 /// Whether the shape is an exact sphere.
-pub(super) fn is_sphere(shape: &Shape) -> bool {
+pub(crate) fn is_sphere(shape: &Shape) -> bool {
     matches!(shape.field(), Field::Sphere(_))
 }
 
