@@ -43,6 +43,10 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         Some(_) => ("cells", format!("{nx} x {ny} x {nz} = {}", e.cells)),
         None => ("fluid", "none (contact only)".into()),
     });
+    if let Some(refined) = case.setup.refined_mesh() {
+        let ([nx, ny, nz], count) = (refined.cells, refined.cell_count());
+        rows.push(("refined box", format!("{nx} x {ny} x {nz} = {count} of half the size")));
+    }
     rows.push(("grains", grains(case)));
     let with_unit = |name, value: Option<f64>, unit: &str| {
         value.map(|v| (name, format!("{} {unit}", short(v)).trim_end().to_string()))

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use grainwake_shape::available_memory;
+use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::narrow_band_bytes;
 use grainwake_solver::sim::Setup;
 
@@ -20,16 +21,18 @@ const BYTES_PER_NODE: f64 = 400.0;
 /// Returns the sum of the squares of the diameters in cells, to which the work and memory of the
 /// coupling are proportional.
 pub(crate) fn surface_cells(setup: &Setup) -> f64 {
-    let across = |diameter: f64| diameter / setup.mesh.spacing.min_element();
+    let across = |diameter: f64| diameter / setup.finest_spacing().min_element();
     setup.grains.iter().map(|grain| across(grain.shape.equivalent_diameter()).powi(2)).sum()
 }
 
 /// Returns the memory of a run: fields, forced faces of the grains, shapes and the distances
 /// sampled around them [bytes].
 pub(crate) fn needed(setup: &Setup) -> u64 {
-    let mesh = &setup.mesh;
+    let refined = setup.refined_mesh();
     // The number of cells of an absurd box exceeds any integer.
-    let cells: f64 = mesh.cells.iter().map(|n| *n as f64).product();
+    let count = |mesh: &Mesh| mesh.cells.iter().map(|n| *n as f64).product::<f64>();
+    let cells = count(&setup.mesh) + refined.as_ref().map_or(0.0, count);
+    let finest = refined.as_ref().unwrap_or(&setup.mesh);
     let mut bytes = 0.0;
     if setup.fluid.is_some() {
         bytes += cells * setup.precision.bytes() as f64 * NUMBERS_PER_CELL;
@@ -42,7 +45,7 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
         if seen.insert(Arc::as_ptr(shape).addr()) {
             bytes += shape.bytes() as f64 + shape.nodes().len() as f64 * BYTES_PER_NODE;
             if setup.fluid.is_some() {
-                bytes += narrow_band_bytes(mesh, shape);
+                bytes += narrow_band_bytes(finest, shape);
             }
         }
     }

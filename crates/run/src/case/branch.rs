@@ -104,6 +104,12 @@ impl Differences<'_> {
             let keys = ["domain.cell_size", "domain.cells", "domain.size", "domain"];
             self.report(&keys, message, AS_BEFORE);
         }
+        if now.refinement != before.refinement {
+            let (here, there) = (now.refinement, before.refinement);
+            let message =
+                format!("the refinement is {here}, and that of the parent run is {there}");
+            self.report(&["domain.refinement", "domain"], message, AS_BEFORE);
+        }
         if mesh.origin != old.origin {
             let (here, there) = (vector(mesh.origin, "m"), vector(old.origin, "m"));
             let message =

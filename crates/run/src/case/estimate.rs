@@ -26,6 +26,8 @@ const NS_PER_NODE: f64 = 2.0;
 pub struct Estimate {
     /// Cells of the grid.
     pub cells: usize,
+    /// Cells of the refined box at the start, if there is one.
+    pub refined_cells: Option<usize>,
     /// Steps expected until `end`.
     pub steps: u64,
     /// Time step expected at the settling speed [s].
@@ -42,7 +44,7 @@ pub struct Estimate {
     pub reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
     pub settling_speed_m_per_s: Option<f64>,
-    /// Cells across the smallest equivalent diameter.
+    /// Cells across the smallest equivalent diameter, on the refined grid if there is one.
     pub cells_per_diameter: Option<f64>,
     /// Cells across the shortest axis of the thinnest grain.
     pub cells_across_shortest_axis: Option<f64>,
@@ -81,11 +83,15 @@ impl Estimate {
         let steps = (plan.end / time_step_s).ceil();
 
         let cells = setup.mesh.cell_count();
+        let refined_cells = setup.refined_mesh().map(|mesh| mesh.cell_count());
         let contact_time_s = contact_time(setup);
         let contact_substeps = contact_time_s
             .map(|t| (time_step_s / (t / setup.contact.substeps_per_contact)).max(1.0));
         let seconds = |ns: f64| ns * 1e-9 / threads.max(1) as f64;
-        let field_bytes = fluid.map_or(0.0, |_| cells as f64 * setup.precision.bytes() as f64);
+        let field_bytes = fluid.map_or(0.0, |_| {
+            let cells = cells + refined_cells.unwrap_or(0);
+            cells as f64 * setup.precision.bytes() as f64
+        });
         // In a fluid the sub-steps of a contact are taken twice (decision 0014).
         let passes = if fluid.is_some() { 2.0 } else { 1.0 };
         let substep_ns = setup.grains.iter().map(|grain| match grain.shape.field() {
@@ -97,10 +103,11 @@ impl Estimate {
         let step_s = seconds(field_bytes * NS_PER_CELL_BYTE + coupling_ns);
         let smallest = smallest_diameter(&setup.grains);
         let cells_per_diameter = (fluid.is_some() && smallest.is_finite())
-            .then(|| smallest / setup.mesh.spacing.max_element());
+            .then(|| smallest / setup.finest_spacing().max_element());
         let reynolds = galileo.map(settling_reynolds);
         Estimate {
             cells,
+            refined_cells,
             steps: steps as u64,
             time_step_s,
             memory_bytes: memory::needed(setup),
@@ -111,7 +118,7 @@ impl Estimate {
             settling_speed_m_per_s: speed,
             cells_per_diameter,
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
-                .then(|| shortest_axis(setup) / setup.mesh.spacing.max_element()),
+                .then(|| shortest_axis(setup) / setup.finest_spacing().max_element()),
             drag_error: cells_per_diameter.zip(reynolds).map(|(n, re)| drag_error(n, re)),
             blockage: blockage(setup),
             contact_time_s,

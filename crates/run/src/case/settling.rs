@@ -73,8 +73,8 @@ pub(super) fn settled_time_step(setup: &Setup) -> f64 {
 
 /// Returns the step that the rule allows at `speed` [s].
 pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
-    let resolved = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1);
-    let h: Vec<f64> = resolved.map(|axis| setup.mesh.spacing[axis]).collect();
+    let spacing = setup.finest_spacing();
+    let h: Vec<f64> = setup.mesh.resolved_axes().map(|axis| spacing[axis]).collect();
     match setup.step {
         StepRule::Fixed(step) => step,
         StepRule::Limits { cfl, viscous, max_step } => {

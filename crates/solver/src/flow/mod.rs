@@ -7,16 +7,20 @@
 //! Legend: u velocity, p dynamic pressure over density, f its increment, H tendency.
 
 mod boundary;
+mod nested;
 mod open_boundary;
 mod prediction;
 mod project;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
 pub use boundary::{Boundaries, Boundary};
+pub(crate) use nested::NestedFlow;
 pub(crate) use open_boundary::{BoxSide, CoveredFace};
 pub(crate) use prediction::{OldState, Prediction};
 pub(crate) use project::FlowMeasures;
+pub(crate) use transfer::RefinedBox;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -137,6 +141,16 @@ impl<R: Real> Flow<R> {
         boundaries.fill_ghost_planes(&mut self.velocity);
     }
 
+    /// Fills the ghosts of the pressure.
+    fn fill_pressure_ghosts(&mut self) {
+        let layout = self.mesh.layout();
+        let planes = self.pressure.chunks_exact_mut(layout.plane());
+        for plane in planes.skip(1).take(layout.cells[2]) {
+            self.boundaries.fill_pressure_of_plane(layout, plane);
+        }
+        self.boundaries.fill_pressure_planes(&mut self.pressure);
+    }
+
     /// Sets the uniform acceleration that drives the flow [m/s^2].
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;
@@ -145,13 +159,18 @@ impl<R: Real> Flow<R> {
     /// Projects the velocity onto the divergence-free fields and keeps the pressure; for initial
     /// states.
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
-        self.predicted.copy_from(&self.velocity);
-        self.boundaries.set_normal(&mut self.predicted);
-        self.convect_outflow(0.0);
+        self.predict_present();
         let pressure = self.pressure.to_vec();
         let measures = self.project(1.0);
         self.pressure.copy_from_slice(&pressure);
         measures
+    }
+
+    /// Makes the present velocity, with the conditions on the sides, the prediction.
+    fn predict_present(&mut self) {
+        self.predicted.copy_from(&self.velocity);
+        self.boundaries.set_normal(&mut self.predicted);
+        self.convect_outflow(0.0);
     }
 
     /// Predicts u* = u + dt (3/2 H^n - 1/2 H^{n-1}) - dt grad p^n, with the weights of a variable

@@ -21,7 +21,7 @@ use super::rigidity::{Impulse, sum_impulse};
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
 use crate::dem::{Grain, MotionConstraint, is_sphere};
-use crate::flow::{Flow, FlowMeasures};
+use crate::flow::{Flow, FlowMeasures, NestedFlow};
 use crate::math::{Real, RigidVelocity, Vector6};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -49,7 +49,7 @@ impl<R: Real> ImmersedGrains<R> {
     /// velocities. Returns the measures of the flow.
     pub fn initialise(
         &mut self,
-        flow: &mut Flow<R>,
+        flow: &mut NestedFlow<R>,
         grains: &mut [Grain],
         start: Start,
     ) -> FlowMeasures {
@@ -60,9 +60,10 @@ impl<R: Real> ImmersedGrains<R> {
         };
         let mut first = None;
         for _ in 1..MAX_PROJECTIONS {
-            flow.predicted.copy_from(&flow.velocity);
-            let impulse = self.impose_start(flow, grains, &mut released);
-            flow.velocity.copy_from(&flow.predicted);
+            let finest = flow.finest_mut();
+            finest.predicted.copy_from(&finest.velocity);
+            let impulse = self.impose_start(finest, grains, &mut released);
+            finest.velocity.copy_from(&finest.predicted);
             if impulse <= TOLERANCE * *first.get_or_insert(impulse)
                 && released.iter().all(Released::converged)
             {

@@ -126,6 +126,14 @@ impl<R: Real> ImmersedGrains<R> {
         immersed
     }
 
+    /// Moves the grains to the grid of `flow`, with the same spacing as the last one, and lists the
+    /// faces near them at their present poses.
+    pub fn move_to_grid(&mut self, flow: &Flow<R>, grains: &[Grain]) {
+        self.mesh = *flow.mesh();
+        self.locator.set_grid(flow.mesh(), flow.boundaries());
+        self.locate(grains);
+    }
+
     /// Lists the faces near the grains at their present poses.
     pub fn locate(&mut self, grains: &[Grain]) {
         self.locate_with_forcing(grains, 1.0);

@@ -5,7 +5,7 @@ use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
 use crate::dem::{Grain, GrainKinematics};
-use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
+use crate::flow::{NestedFlow, Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
 
@@ -40,7 +40,9 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
     let mut grains = grains();
     let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
-    immersed.initialise(&mut flow, &mut grains, Start::Impulsive);
+    let mut nested = NestedFlow::new(flow, &params);
+    immersed.initialise(&mut nested, &mut grains, Start::Impulsive);
+    let mut flow = nested.whole;
     let previous = grains
         .each_ref()
         .map(|grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() });

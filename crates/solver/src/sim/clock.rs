@@ -31,11 +31,10 @@ const ROUNDING: f64 = 1e-12;
 impl Clock {
     /// Clock at t = 0.
     pub fn new(setup: &Setup) -> Clock {
-        let mesh = &setup.mesh;
-        let inverse_squares: f64 =
-            mesh.resolved_axes().map(|axis| mesh.spacing[axis].powi(-2)).sum();
-        let smallest =
-            mesh.resolved_axes().map(|axis| mesh.spacing[axis]).fold(f64::INFINITY, f64::min);
+        let spacing = setup.finest_spacing();
+        let resolved = || setup.mesh.resolved_axes().map(|axis| spacing[axis]);
+        let inverse_squares: f64 = resolved().map(|h| h.powi(-2)).sum();
+        let smallest = resolved().fold(f64::INFINITY, f64::min);
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         let acceleration = setup
             .grains

@@ -3,13 +3,14 @@
 use std::io;
 
 use glam::DVec3;
-use grainwake_formats::codec::{Decoder, Encoder};
+use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
 use super::fields::AnyFieldView;
 use super::probe::{Probe, SampledGrid};
+use super::refinement;
 use super::setup::Setup;
 use crate::dem::Grain;
-use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams};
+use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams, NestedFlow, RefinedBox};
 use crate::grid::{Axis, FieldView};
 use crate::immersed::{CoupledGrains, CouplingInput, ImmersedGrains, RigidityInput};
 use crate::math::{Precision, Real};
@@ -51,7 +52,7 @@ pub(super) trait Fluid: Send + Sync {
     fn vorticity_at(&self, cell: [usize; 3]) -> DVec3;
     /// Velocity [m/s] at a point; `None` outside the box.
     fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3>;
-    /// Wall time that the Poisson solver has spent in each of its stages.
+    /// Wall time that the Poisson solver of the whole box has spent in each of its stages.
     fn poisson_times(&self) -> PoissonTimes;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
@@ -70,25 +71,47 @@ pub(super) fn start(setup: &mut Setup, params: &FluidParams) -> Box<dyn Fluid> {
 }
 
 struct FluidOf<R> {
-    flow: Flow<R>,
+    flow: NestedFlow<R>,
     grains: ImmersedGrains<R>,
     measures: FlowMeasures,
+    /// Grains when they were located last, if a refined box follows them.
+    followed: Vec<Grain>,
 }
 
 impl<R: Real> FluidOf<R> {
     fn probe(&self) -> Probe<'_, R> {
-        let grid = SampledGrid { mesh: self.flow.mesh(), boundaries: self.flow.boundaries() };
-        Probe { velocity: &self.flow.velocity, grid }
+        let whole = &self.flow.whole;
+        let grid = SampledGrid { mesh: whole.mesh(), boundaries: whole.boundaries() };
+        Probe { velocity: &whole.velocity, grid }
     }
     fn start(setup: &mut Setup, params: &FluidParams) -> FluidOf<R> {
-        let mut flow = Flow::new(&setup.mesh, setup.boundaries, params);
+        let mut whole = Flow::new(&setup.mesh, setup.boundaries, params);
         if let Some(velocity) = &setup.prescription.initial_velocity {
-            flow.start_from(|axis, at| velocity.component(axis, &at.to_array()));
+            whole.start_from(|axis, at| velocity.component(axis, &at.to_array()));
+        }
+        let mut flow = NestedFlow::new(whole, params);
+        let mut followed = Vec::new();
+        if let Some(place) = refinement::first_box(setup) {
+            flow.refine(place);
+            followed = setup.grains.clone();
         }
         let (density, nu) = (params.density, params.kinematic_viscosity);
-        let mut grains = ImmersedGrains::new(&flow, setup.scheme, density, nu, &setup.grains);
+        let mut grains =
+            ImmersedGrains::new(flow.finest(), setup.scheme, density, nu, &setup.grains);
         let measures = grains.initialise(&mut flow, &mut setup.grains, setup.start);
-        FluidOf { flow, grains, measures }
+        FluidOf { flow, grains, measures, followed }
+    }
+
+    /// Moves the refined box if the grains have left its middle.
+    fn follow_grains(&mut self) {
+        let Some(present) = self.flow.refined_box() else { return };
+        let whole = &self.flow.whole;
+        let (mesh, boundaries) = (whole.mesh(), whole.boundaries());
+        let place = refinement::next_box(mesh, boundaries, &self.followed, present);
+        if place != present {
+            self.flow.refine(place);
+            self.grains.move_to_grid(self.flow.finest(), &self.followed);
+        }
     }
 }
 
@@ -100,28 +123,35 @@ where
         self.flow.set_body_acceleration(acceleration);
     }
     fn predict(&mut self, dt: f64) {
+        self.follow_grains();
         self.flow.predict(dt);
     }
     fn project_prediction(&mut self, dt: f64) {
-        self.flow.project_prediction(dt);
+        self.flow.whole.project_prediction(dt);
     }
     fn couple(&mut self, input: CouplingInput) -> CoupledGrains {
-        self.grains.couple(&mut self.flow, input)
+        if !self.followed.is_empty() {
+            self.followed.clone_from_slice(input.grains);
+        }
+        self.grains.couple(self.flow.finest_mut(), input)
     }
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidityInput) {
-        self.grains.impose_rigidity(&mut self.flow, coupled, step);
+        self.grains.impose_rigidity(self.flow.finest_mut(), coupled, step);
     }
     fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]) {
-        self.flow.set_crossing_speeds(speeds);
+        self.flow.whole.set_crossing_speeds(speeds);
     }
     fn pressure_below(&self, covered: &[CoveredFace]) -> Vec<f64> {
-        self.flow.pressure_below(covered)
+        self.flow.whole.pressure_below(covered)
     }
     fn cover_boundary(&mut self, covered: &[CoveredFace]) {
-        self.flow.cover_boundary(covered);
+        self.flow.whole.cover_boundary(covered);
     }
     fn locate(&mut self, grains: &[Grain]) {
-        self.grains.locate(grains);
+        if !self.followed.is_empty() {
+            self.followed.clone_from_slice(grains);
+        }
+        self.grains.move_to_grid(self.flow.finest(), grains);
     }
     fn project(&mut self, dt: f64) {
         self.measures = self.flow.project(dt);
@@ -130,13 +160,13 @@ where
         &self.measures
     }
     fn boundary_impulse(&self, dt: f64) -> DVec3 {
-        self.flow.boundary_impulse(dt)
+        self.flow.whole.boundary_impulse(dt)
     }
     fn velocity(&self, axis: Axis) -> AnyFieldView<'_> {
-        self.flow.velocity_view(axis).into()
+        self.flow.whole.velocity_view(axis).into()
     }
     fn kinematic_pressure(&self) -> AnyFieldView<'_> {
-        self.flow.pressure_view().into()
+        self.flow.whole.pressure_view().into()
     }
     fn velocity_at(&self, cell: [usize; 3]) -> DVec3 {
         self.probe().velocity_at(cell)
@@ -148,44 +178,79 @@ where
         self.probe().interpolate_velocity(x)
     }
     fn poisson_times(&self) -> PoissonTimes {
-        self.flow.poisson_times()
+        self.flow.whole.poisson_times()
     }
     fn bytes(&self) -> usize {
-        self.flow.bytes() + self.grains.bytes()
+        self.flow.flows().map(Flow::bytes).sum::<usize>() + self.grains.bytes()
     }
     fn save(&self, out: &mut Encoder) -> io::Result<()> {
         out.u64(R::BYTES as u64)?;
         let m = &self.measures;
         out.reals(&[m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy])?;
         out.vector(m.momentum)?;
-        let (fields, sums) = self.flow.state();
-        let layout = self.flow.mesh().layout();
-        for values in fields {
-            out.u64(layout.entries() as u64)?;
-            for row in layout.rows(values) {
-                out.reals(row)?;
+        save_flow(&self.flow.whole, out)?;
+        if let Some(place) = self.flow.refined_box() {
+            for axis in 0..3 {
+                out.u64(place.corner[axis] as u64)?;
+                out.u64(place.cells[axis] as u64)?;
             }
+            save_flow(self.flow.finest(), out)?;
         }
-        out.u64(sums.len() as u64)?;
-        out.reals(sums)
+        Ok(())
     }
     fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()> {
         input.expect(R::BYTES, "bytes a number")?;
         let m = &mut self.measures;
         [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
         m.momentum = input.vector()?;
-        let layout = self.flow.mesh().layout();
-        let (fields, sums) = self.flow.state_mut(last_step);
-        for values in fields {
-            input.expect(layout.entries(), "field entries")?;
-            for row in layout.rows_mut(values) {
-                input.fill(row)?;
+        restore_flow(&mut self.flow.whole, input, last_step)?;
+        if self.flow.refined_box().is_some() {
+            let mut place = RefinedBox { corner: [0; 3], cells: [0; 3] };
+            for axis in 0..3 {
+                place.corner[axis] = input.u64()? as isize;
+                place.cells[axis] = input.u64()? as usize;
             }
+            let whole = &self.flow.whole;
+            if !refinement::is_possible(whole.mesh(), whole.boundaries(), place) {
+                return Err(invalid(format!("the refined box {place:?} does not fit the grid")));
+            }
+            self.flow.refine(place);
+            restore_flow(self.flow.finest_mut(), input, last_step)?;
         }
-        input.expect(sums.len(), "sums")?;
-        input.fill(sums)?;
         // The saved ghosts belong to the walls of the saved run, whose velocities may differ.
         self.flow.fill_ghosts();
         Ok(())
     }
+}
+
+/// Writes the state of a flow.
+fn save_flow<R: Real>(flow: &Flow<R>, out: &mut Encoder) -> io::Result<()> {
+    let (fields, sums) = flow.state();
+    let layout = flow.mesh().layout();
+    for values in fields {
+        out.u64(layout.entries() as u64)?;
+        for row in layout.rows(values) {
+            out.reals(row)?;
+        }
+    }
+    out.u64(sums.len() as u64)?;
+    out.reals(sums)
+}
+
+/// Reads the state written by [`save_flow`].
+fn restore_flow<R: Real>(
+    flow: &mut Flow<R>,
+    input: &mut Decoder,
+    last_step: f64,
+) -> io::Result<()> {
+    let layout = flow.mesh().layout();
+    let (fields, sums) = flow.state_mut(last_step);
+    for values in fields {
+        input.expect(layout.entries(), "field entries")?;
+        for row in layout.rows_mut(values) {
+            input.fill(row)?;
+        }
+    }
+    input.expect(sums.len(), "sums")?;
+    input.fill(sums)
 }

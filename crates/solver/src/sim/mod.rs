@@ -8,6 +8,7 @@ mod fields;
 mod fluid;
 mod prescription;
 mod probe;
+mod refinement;
 mod sample;
 mod setup;
 mod solid_fraction;

@@ -8,7 +8,7 @@ use crate::grid::Mesh;
 use crate::immersed::{Scheme, Start};
 use crate::math::Precision;
 
-use super::Prescription;
+use super::{Prescription, refinement};
 
 /// Rule for the length of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,9 @@ pub struct Setup {
     pub fluid: Option<FluidParams>,
     /// Floating-point precision of the fields; by default double.
     pub precision: Precision,
+    /// Cells along the edge of a cell of the grid in a box around the grains, which moves with
+    /// them: 1, the default, refines nothing; 2 halves the spacing there.
+    pub refinement: usize,
     /// Coupling scheme.
     pub scheme: Scheme,
     /// Start of grains that have a velocity relative to the fluid; by default impulsive.
@@ -86,6 +89,7 @@ impl Setup {
             boundaries: Boundaries([[Boundary::WALL; 2]; 3]),
             fluid: None,
             precision: Precision::Double,
+            refinement: 1,
             scheme: Scheme::default(),
             start: Start::default(),
             gravity: DVec3::ZERO,
@@ -108,6 +112,11 @@ impl Setup {
     /// Replaces the floating-point precision of the fields.
     pub fn with_precision(mut self, precision: Precision) -> Setup {
         self.precision = precision;
+        self
+    }
+    /// Replaces the refinement around the grains, 1 or 2.
+    pub fn with_refinement(mut self, refinement: usize) -> Setup {
+        self.refinement = refinement;
         self
     }
     /// Replaces the coupling scheme.
@@ -144,6 +153,16 @@ impl Setup {
     pub fn with_prescription(mut self, prescription: Prescription) -> Setup {
         self.prescription = prescription;
         self
+    }
+
+    /// Spacing of the grid around the grains [m].
+    pub fn finest_spacing(&self) -> DVec3 {
+        self.mesh.spacing / self.refinement as f64
+    }
+
+    /// Grid of the refined box at t = 0, if there is one.
+    pub fn refined_mesh(&self) -> Option<Mesh> {
+        refinement::first_box(self).map(|place| place.mesh(&self.mesh))
     }
 
     /// Walls and periodic axes of the box for contact.
@@ -205,6 +224,16 @@ impl Setup {
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));
+        }
+        if self.refinement != 1 {
+            let flat = (0..3).any(|axis| !self.mesh.is_resolved(axis));
+            if self.refinement != 2 {
+                return fail(format!("the refinement must be 1 or 2, not {}", self.refinement));
+            } else if self.scheme == Scheme::Paper {
+                return fail("the paper's scheme works on one grid, without refinement".into());
+            } else if flat {
+                return fail("a box with a flat axis cannot be refined".into());
+            }
         }
         let motions = &self.prescription.motions;
         if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {

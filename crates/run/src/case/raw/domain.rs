@@ -20,6 +20,8 @@ pub struct RawDomain {
     pub cells: Option<Located<[usize; 3]>>,
     /// Cell edge [m]: one length, or one for each axis.
     pub cell_size: Option<Located<CellSize>>,
+    /// Cells along the edge of a cell in a box around the grains, which moves with them: 1 or 2.
+    pub refinement: Option<Located<usize>>,
     /// Lower corner of the box [m].
     #[serde(default)]
     pub origin: Located<Triple<Length>>,

@@ -5,10 +5,13 @@ use glam::DVec3;
 use super::check::Checker;
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Length, Triple};
-use crate::case::raw::{AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawDomain};
+use crate::case::raw::{
+    AxisFaces, CellSize, Face, FaceKind, RawBoundaries, RawCoupling, RawDomain,
+};
 use crate::number_format::{AXES, length, number, quantity, vector};
 use grainwake_solver::flow::{Boundaries, Boundary};
 use grainwake_solver::grid::Mesh;
+use grainwake_solver::immersed::Scheme;
 
 /// Largest number of cells along an axis; more suggest a forgotten unit.
 const MOST_CELLS: usize = 1 << 20;
@@ -129,6 +132,40 @@ fn divide(
         cells[axis] = whole as usize;
     }
     Some(cells)
+}
+
+/// Returns the refinement around the grains.
+pub(super) fn refinement(
+    check: &mut Checker,
+    raw: &RawDomain,
+    coupling: &RawCoupling,
+    mesh: &Mesh,
+    dry: bool,
+) -> usize {
+    let Some(refinement) = &raw.refinement else { return 1 };
+    let mut fail = |message: String, help: &str| check.fail(&refinement.span, message, help);
+    match refinement.value {
+        1 => {}
+        2 if dry => {
+            let help = "leave out refinement, or add [fluid]";
+            fail("a case without a fluid has no grid to refine".into(), help);
+        }
+        2 if coupling.scheme.value == Scheme::Paper => {
+            let help = "leave out refinement, or the scheme";
+            fail("the paper's scheme works on one grid".into(), help);
+        }
+        2 => {
+            if let Some(axis) = (0..3).find(|axis| !mesh.is_resolved(*axis)) {
+                let help = "give the axis more cells, or leave out refinement";
+                fail(format!("{} is flat, and a flat axis cannot be refined", AXES[axis]), help);
+            }
+        }
+        found => {
+            let help = "2 halves the cells in a box around the grains, 1 does not";
+            fail(format!("found {found}"), help);
+        }
+    }
+    refinement.value
 }
 
 /// Positions in the source of the conditions on the six faces.

@@ -130,11 +130,14 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     } else {
         None
     };
-    let step = plan::step(check, &mut raw.time, &mesh, &grains, gravity, dry);
+    let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, dry);
+    let spacing = mesh.spacing / refinement.max(1) as f64;
+    let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, dry);
     let setup = Setup::new(mesh)
         .with_boundaries(boundaries.0)
         .with_fluid(fluid)
         .with_precision(raw.run.precision.value)
+        .with_refinement(refinement)
         .with_scheme(raw.coupling.scheme.value)
         .with_start(raw.coupling.start.value)
         .with_gravity(gravity)

@@ -20,11 +20,11 @@ const SMALLEST_STEP: f64 = 1e-3;
 /// Largest number of rows or files of one output; more suggest a forgotten unit.
 const MOST_OUTPUTS: f64 = 1e7;
 
-/// Returns the step rule and writes its limits.
+/// Returns the step rule and writes its limits; `spacing` [m] is that of the finest grid.
 pub(super) fn step(
     check: &mut Checker,
     raw: &mut RawTime,
-    mesh: &Mesh,
+    spacing: glam::DVec3,
     grains: &[Grain],
     gravity: glam::DVec3,
     dry: bool,
@@ -51,7 +51,7 @@ pub(super) fn step(
     let viscous = raw.viscous.get_or_insert_with(|| number(default_viscous));
     // Above 0.216 the two-step extrapolation of diffusion is unstable at a wall.
     let viscous = check.within(viscous, 1e-6, 0.21);
-    let longest = || default_max_step(mesh.spacing, grains, gravity, dry, end);
+    let longest = || default_max_step(spacing, grains, gravity, dry, end);
     let max_step = (raw.max_step).get_or_insert_with(|| Quantity::new(longest()).into());
     let max_step = check.positive(max_step, "the longest step");
     Some(StepRule::Limits { cfl: cfl?, viscous: viscous?, max_step: max_step? })

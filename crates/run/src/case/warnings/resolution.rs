@@ -4,6 +4,7 @@ use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
 use crate::case::settling::time_step;
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
+use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::{Setup, StepRule};
 
@@ -26,19 +27,20 @@ const MOST_SINGLE_STEPS: u64 = 50_000;
 /// Coarse grids, blockage, and costs.
 pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     let mut found = Vec::new();
+    let finer = finer_grid(setup);
     // The number counts as printed: a measured diameter of 7.98 cells is no reason for a warning.
     let printed = |n: f64| (10.0 * n).round() / 10.0;
     if let Some(n) = e.cells_per_diameter.map(printed).filter(|n| *n < COARSE) {
-        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough; make cell_size smaller"));
+        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough; {finer}"));
     }
     if let Some(n) = e.cells_across_shortest_axis.map(printed).filter(|n| *n < THIN) {
-        found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; make cell_size smaller"));
+        found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; {finer}"));
     }
     if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
         let error = THIN_LAYER_DRAG_ERROR * re / (n * n);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {:.0} cells reduce the error to 3 %",
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {:.0} cells reduce the error to 3 %: {finer}",
                 n / re.sqrt(),
                 drag_error_text(error, 0),
                 (THIN_LAYER_DRAG_ERROR * re / 0.03).sqrt().ceil()
@@ -94,6 +96,18 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     found
 }
 
+/// Advice to resolve the grains better.
+fn finer_grid(setup: &Setup) -> &'static str {
+    let can_refine = setup.refinement == 1
+        && setup.scheme == Scheme::Aperture
+        && setup.mesh.cells.iter().all(|n| *n > 1);
+    if can_refine {
+        "make cell_size smaller, or set refinement = 2 in [domain], which halves the cells around the grains"
+    } else {
+        "make cell_size smaller"
+    }
+}
+
 /// Contact that dominates the cost of a long run, or needs many sub-steps in a fluid.
 fn contact_cost(setup: &Setup, e: &Estimate) -> Option<String> {
     let substeps = e.contact_substeps?;
@@ -118,7 +132,7 @@ fn first_step(setup: &Setup) -> Option<String> {
     };
     setup.fluid.as_ref()?;
     let inverse_spacing = |axis: usize| {
-        if setup.mesh.is_resolved(axis) { 1.0 / setup.mesh.spacing[axis] } else { 0.0 }
+        if setup.mesh.is_resolved(axis) { 1.0 / setup.finest_spacing()[axis] } else { 0.0 }
     };
     let cfl = |grain: &Grain| {
         let turning = grain.angular_velocity.length() * grain.shape.bounding_radius();

@@ -79,6 +79,12 @@ impl Locator {
         }
     }
 
+    /// Replaces the grid by one of the same spacing.
+    pub fn set_grid(&mut self, mesh: &Mesh, boundaries: &Boundaries) {
+        self.mesh = *mesh;
+        self.unknown_faces = UnknownFaces::new(mesh, boundaries);
+    }
+
     /// Half-width of the band around the surface [m].
     pub fn eps(&self) -> f64 {
         self.eps

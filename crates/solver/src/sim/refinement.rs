@@ -1,0 +1,168 @@
+//! The box of the grid that is refined around the grains.
+
+use glam::DVec3;
+
+use super::Setup;
+use crate::dem::Grain;
+use crate::flow::{Boundaries, RefinedBox};
+use crate::grid::Mesh;
+
+/// Distance from the grains to the sides of the refined box, in diameters of the bounding sphere
+/// of the grain. Wider boxes give the same forces (`docs/decisions/0027-refined-box.md`).
+const MARGIN: f64 = 0.4;
+/// Least distance from the grains to the sides of the refined box [cells of the whole grid].
+const LEAST_MARGIN: f64 = 3.0;
+/// Cells by which a new box exceeds what the grains need, so that it moves less often.
+const SLACK: usize = 2;
+/// Cells beyond a new box from which on a box is replaced by a smaller one.
+const EXCESS: usize = 8;
+/// Largest distance of a refined box from the box of a periodic axis [cells].
+const FAR: isize = 1 << 40;
+
+/// Refined box at t = 0; none if the set-up asks for none or has no grains in a fluid.
+pub fn first_box(setup: &Setup) -> Option<RefinedBox> {
+    let needed = setup.refinement > 1 && setup.fluid.is_some();
+    let needed = needed.then(|| needed_range(&setup.mesh, &setup.grains)).flatten()?;
+    Some(place(&setup.mesh, &setup.boundaries, needed, None))
+}
+
+/// Refined box for grains at their present poses, which is the `present` one as long as it holds
+/// all of them.
+pub fn next_box(
+    mesh: &Mesh,
+    boundaries: &Boundaries,
+    grains: &[Grain],
+    present: RefinedBox,
+) -> RefinedBox {
+    match needed_range(mesh, grains) {
+        Some(needed) => place(mesh, boundaries, needed, Some(present)),
+        None => present,
+    }
+}
+
+/// Whether a box lies in the grid.
+pub fn is_possible(mesh: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> bool {
+    (0..3).all(|axis| {
+        let (corner, cells, n) = (place.corner[axis], place.cells[axis], mesh.cells[axis]);
+        let fits = if boundaries.is_periodic(axis) {
+            corner.abs() < FAR
+        } else {
+            corner >= 0 && cells <= n && corner <= (n - cells) as isize
+        };
+        fits && (1..=n).contains(&cells)
+    })
+}
+
+/// Lower and upper end of what must be refined [cells from the lower corner of the box]; none if
+/// all grains have left.
+fn needed_range(mesh: &Mesh, grains: &[Grain]) -> Option<[DVec3; 2]> {
+    let ranges = grains.iter().filter(|grain| !grain.has_left()).map(|grain| {
+        let radius = grain.shape.bounding_radius();
+        let reach = DVec3::splat((1.0 + 2.0 * MARGIN) * radius) / mesh.spacing;
+        let reach = reach.max(radius / mesh.spacing + LEAST_MARGIN);
+        let centre = (grain.pose.position - mesh.origin) / mesh.spacing;
+        [centre - reach, centre + reach]
+    });
+    ranges.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)])
+}
+
+fn place(
+    mesh: &Mesh,
+    boundaries: &Boundaries,
+    [low, high]: [DVec3; 2],
+    present: Option<RefinedBox>,
+) -> RefinedBox {
+    let mut result = RefinedBox { corner: [0; 3], cells: mesh.cells };
+    for axis in 0..3 {
+        let (n, periodic) = (mesh.cells[axis], boundaries.is_periodic(axis));
+        let (low, high) =
+            if periodic { (low[axis], high[axis]) } else { (low[axis].max(0.0), high[axis].min(n as f64)) };
+        let wanted = fast_count((high - low).ceil() as usize + SLACK);
+        if wanted >= n {
+            continue;
+        }
+        if let Some(present) = present {
+            let (corner, cells) = (present.corner[axis], present.cells[axis]);
+            let holds = corner as f64 <= low && (corner + cells as isize) as f64 >= high;
+            if holds && cells <= wanted + EXCESS {
+                (result.corner[axis], result.cells[axis]) = (corner, cells);
+                continue;
+            }
+        }
+        // A box that is large enough keeps its size.
+        let kept = present.map(|present| present.cells[axis]);
+        let cells = kept.filter(|kept| (wanted..=wanted + EXCESS).contains(kept)).unwrap_or(wanted);
+        let corner = (0.5 * (low + high - cells as f64)).round() as isize;
+        let last = (n - cells) as isize;
+        result.cells[axis] = cells;
+        result.corner[axis] = if periodic { corner } else { corner.clamp(0, last) };
+    }
+    result
+}
+
+/// Smallest count from `count` on without prime factors beyond 5, for which transforms are fast.
+fn fast_count(count: usize) -> usize {
+    let is_fast = |n: &usize| {
+        let mut n = *n;
+        for factor in [2, 3, 5] {
+            while n.is_multiple_of(factor) {
+                n /= factor;
+            }
+        }
+        n == 1
+    };
+    (count..).find(is_fast).unwrap_or(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::Boundary;
+    use grainwake_shape::Shape;
+    use std::sync::Arc;
+
+    const MESH: Mesh = Mesh { cells: [40, 40, 80], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
+
+    /// Box around spheres of diameter 1 at the given positions.
+    fn placed(positions: &[[f64; 3]], side: Boundary, present: Option<RefinedBox>) -> RefinedBox {
+        let shape = Arc::new(Shape::sphere(0.5, 0));
+        let grains: Vec<Grain> = positions
+            .iter()
+            .map(|x| Grain::new(shape.clone(), 1.5).with_position(DVec3::from_array(*x)))
+            .collect();
+        let needed = needed_range(&MESH, &grains).unwrap();
+        place(&MESH, &Boundaries([[side; 2]; 3]), needed, present)
+    }
+
+    #[test]
+    fn the_box_holds_the_grains_and_stays_while_it_does() {
+        let first = placed(&[[2.5, 2.5, 8.0]], Boundary::WALL, None);
+        // 8 cells across, 2 times 3.2 around and 2 of slack: 17, and 18 has small factors.
+        assert_eq!((first.cells, first.corner), ([18; 3], [11, 11, 55]));
+        let near = placed(&[[2.5, 2.5, 7.9]], Boundary::WALL, Some(first));
+        assert_eq!(near, first);
+        let far = placed(&[[2.5, 2.5, 7.5]], Boundary::WALL, Some(first));
+        assert_eq!((far.cells, far.corner), ([18; 3], [11, 11, 51]));
+    }
+
+    #[test]
+    fn the_box_ends_at_walls_and_continues_across_periodic_sides() {
+        let beside = [[0.6, 2.5, 0.6]];
+        assert_eq!(placed(&beside, Boundary::WALL, None).corner, [0, 11, 0]);
+        let periodic = placed(&beside, Boundary::Periodic, None);
+        assert_eq!((periodic.corner, periodic.cells), ([-4, 11, -4], [18; 3]));
+        let later = placed(&[[-9.4, 2.5, 0.6]], Boundary::Periodic, Some(periodic));
+        assert_eq!(later.corner, [-84, 11, -4]);
+    }
+
+    #[test]
+    fn grains_far_apart_share_one_box() {
+        let two = placed(&[[2.5, 2.5, 2.0], [2.5, 2.5, 6.0]], Boundary::WALL, None);
+        assert_eq!(two.cells, [18, 18, 50]);
+        let all = placed(&[[0.6, 2.5, 1.0], [4.4, 2.5, 9.0]], Boundary::Periodic, None);
+        assert_eq!((all.cells, all.corner), ([40, 18, 80], [0, 11, 0]));
+        // It shrinks when the grains have met.
+        let met = placed(&[[2.5, 2.5, 2.0], [2.5, 2.5, 3.0]], Boundary::WALL, Some(two));
+        assert_eq!(met.cells, [18, 18, 25]);
+    }
+}
