@@ -15,6 +15,7 @@
 use super::transfer::{Nesting, RefinedBox};
 use super::{Flow, FlowMeasures, FluidParams};
 use crate::math::Real;
+use crate::poisson::PoissonTimes;
 use glam::DVec3;
 
 /// Flow on the whole box, and on a refined box if there is one.
@@ -23,6 +24,8 @@ pub struct NestedFlow<R = f64> {
     pub whole: Flow<R>,
     refined: Option<Refined<R>>,
     params: FluidParams,
+    /// Time of the Poisson solvers of past refined boxes.
+    past_times: PoissonTimes,
 }
 
 /// Flow on a refined box.
@@ -35,7 +38,7 @@ impl<R: Real> NestedFlow<R> {
     /// Flow without a refined box.
     pub fn new(whole: Flow<R>, params: &FluidParams) -> NestedFlow<R> {
         let params = FluidParams { initial_velocity: DVec3::ZERO, ..*params };
-        NestedFlow { whole, refined: None, params }
+        NestedFlow { whole, refined: None, params, past_times: PoissonTimes::default() }
     }
 
     /// The refined box, if there is one.
@@ -69,6 +72,9 @@ impl<R: Real> NestedFlow<R> {
                 (Flow { mesh, ..flow }, Some((of_old, fields)))
             }
             old => {
+                if let Some((flow, ..)) = &old {
+                    self.past_times = self.past_times + flow.poisson_times();
+                }
                 let flow = Flow::new(&mesh, boundaries, &self.params);
                 (flow, old.map(|(_, of_old, fields)| (of_old, fields)))
             }
@@ -153,6 +159,11 @@ impl<R: Real> NestedFlow<R> {
             flow.fill_ghosts();
             nesting.fill_ghosts(&self.whole.velocity, &mut flow.velocity);
         }
+    }
+
+    /// Time that the Poisson solvers of both grids have spent in each of their stages.
+    pub fn poisson_times(&self) -> PoissonTimes {
+        self.flows().fold(self.past_times, |sum, flow| sum + flow.poisson_times())
     }
 
     /// The flow on the whole box, then that on the refined one.

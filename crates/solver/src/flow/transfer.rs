@@ -44,16 +44,18 @@ pub struct Gain {
 }
 
 /// Place of a refined box in the grid of the whole box.
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nesting {
     /// The refined box.
     pub place: RefinedBox,
     whole: Layout,
     refined: Layout,
     cell_volume: f64,
-    periodic: [bool; 3],
     /// Sides of the refined box on a wall of the whole box, or periodic with the opposite one.
     shared: [[bool; 2]; 3],
+    /// Periodic axes along which the refined box spans the whole box.
+    spanned: [bool; 3],
+    /// Positions on the whole grid along each axis of the cells c from -1 to the number of cells.
+    positions: [Vec<usize>; 3],
 }
 
 /// Two positions along an axis and their weights.
@@ -62,26 +64,35 @@ type Pair = [(usize, f64); 2];
 impl Nesting {
     /// Places the refined box in a grid with the given sides.
     pub fn new(whole: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> Nesting {
-        let mut nesting = Nesting {
+        let mut shared = [[false; 2]; 3];
+        for side in BoxSide::all() {
+            let (axis, n) = (side.axis, whole.cells[side.axis] as isize);
+            let (lower, cells) = (place.corner[axis], place.cells[axis] as isize);
+            shared[axis][side.side] = match side.boundary(boundaries) {
+                Boundary::Periodic => cells == n,
+                Boundary::Wall { .. } | Boundary::Slip if side.side == 0 => lower == 0,
+                Boundary::Wall { .. } | Boundary::Slip => lower + cells == n,
+                Boundary::FreeSurface | Boundary::Inflow { .. } | Boundary::Outflow => false,
+            };
+        }
+        let positions = [0, 1, 2].map(|axis| {
+            let n = whole.cells[axis] as isize;
+            let cells = -1..=place.cells[axis] as isize;
+            let at = cells.map(|c| {
+                let at = place.corner[axis] + c;
+                (1 + if boundaries.is_periodic(axis) { at.rem_euclid(n) } else { at }) as usize
+            });
+            at.collect()
+        });
+        Nesting {
             place,
             whole: whole.layout(),
             refined: place.mesh(whole).layout(),
             cell_volume: whole.cell_volume(),
-            periodic: boundaries.periodic(),
-            shared: [[false; 2]; 3],
-        };
-        for side in BoxSide::all() {
-            let (axis, n) = (side.axis, whole.cells[side.axis] as isize);
-            let (lower, cells) = (place.corner[axis], place.cells[axis] as isize);
-            nesting.shared[axis][side.side] = match side.boundary(boundaries) {
-                Boundary::Periodic => cells == n,
-                Boundary::Wall { .. } | Boundary::Slip => {
-                    if side.side == 0 { lower == 0 } else { lower + cells == n }
-                }
-                _ => false,
-            };
+            shared,
+            spanned: [0, 1, 2].map(|axis| boundaries.is_periodic(axis) && shared[axis][0]),
+            positions,
         }
-        nesting
     }
 
     /// Conditions on the sides of the refined box: those of the whole box on shared sides. On the
@@ -101,18 +112,14 @@ impl Nesting {
         BoxSide::all().filter(move |side| !shared[side.axis][side.side])
     }
 
-    /// Position on the whole grid of the cell `c`, -1 and `cells` included.
+    /// Position on the whole grid of the cell `c`, -1 and the number of cells included.
     fn position(&self, axis: usize, c: isize) -> usize {
-        let (at, n) = (self.place.corner[axis] + c, self.whole.cells[axis] as isize);
-        let at = if self.periodic[axis] { at.rem_euclid(n) } else { at };
-        (at + 1) as usize
+        self.positions[axis][(c + 1) as usize]
     }
 
-    /// Index c of position `at` on the whole grid; none outside the refined box.
-    fn relative(&self, axis: usize, at: usize) -> Option<usize> {
-        let (c, n) = (at as isize - 1 - self.place.corner[axis], self.whole.cells[axis] as isize);
-        let c = if self.periodic[axis] { c.rem_euclid(n) } else { c };
-        usize::try_from(c).ok().filter(|c| *c < self.place.cells[axis] && (1..=n as usize).contains(&at))
+    /// Positions on the whole grid of the cells of the refined box.
+    fn inside(&self, axis: usize) -> &[usize] {
+        &self.positions[axis][1..=self.place.cells[axis]]
     }
 
     /// Positions on the whole grid and weights of the linear interpolation to each position of the
@@ -168,34 +175,27 @@ impl Nesting {
     /// Sets the normal velocity of `to` on the inner sides. Each face of the whole grid is divided
     /// into four faces with the same flux in all, linear in the position.
     pub fn set_sides<R: Real>(&self, from: &FaceVector<R>, to: &mut FaceVector<R>) {
+        let (whole, refined) = (self.whole.strides(), self.refined.strides());
         for side in self.inner_sides() {
             let axis = side.axis;
             let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-            let from = from.component(axis);
-            let to = to.component_mut(axis);
+            let (from, to) = (from.component(axis), to.component_mut(axis));
             let c = if side.side == 0 { 0 } else { self.place.cells[axis] };
-            let at_face = |da: isize, db: isize| {
-                let mut at = [0; 3];
-                at[axis] = self.position(axis, c as isize);
-                at[a] = self.position(a, da);
-                at[b] = self.position(b, db);
-                from[self.whole.index(at[0], at[1], at[2])].wide()
-            };
-            for cb in 0..self.place.cells[b] {
-                for ca in 0..self.place.cells[a] {
-                    let (ia, ib) = (ca as isize, cb as isize);
-                    let mean = at_face(ia, ib);
-                    let along_a = 0.125 * (at_face(ia + 1, ib) - at_face(ia - 1, ib));
-                    let along_b = 0.125 * (at_face(ia, ib + 1) - at_face(ia, ib - 1));
-                    for (half_a, half_b) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                        let mut at = [0; 3];
-                        at[axis] = RATIO * c + 1;
-                        at[a] = RATIO * ca + half_a + 1;
-                        at[b] = RATIO * cb + half_b + 1;
-                        let sign = |half: usize| 2.0 * half as f64 - 1.0;
-                        let value = mean + sign(half_a) * along_a + sign(half_b) * along_b;
-                        to[self.refined.index(at[0], at[1], at[2])] = R::of(value);
-                    }
+            let layer = whole[axis] * self.position(axis, c as isize);
+            let lowest = refined[axis] * (RATIO * c + 1) + refined[a] + refined[b];
+            for (cb, at_b) in self.positions[b].windows(3).enumerate() {
+                for (ca, at_a) in self.positions[a].windows(3).enumerate() {
+                    let value = |i: usize, j: usize| {
+                        from[layer + whole[a] * at_a[i] + whole[b] * at_b[j]].wide()
+                    };
+                    let mean = value(1, 1);
+                    let along_a = 0.125 * (value(2, 1) - value(0, 1));
+                    let along_b = 0.125 * (value(1, 2) - value(1, 0));
+                    let at = lowest + RATIO * (refined[a] * ca + refined[b] * cb);
+                    to[at] = R::of(mean - along_a - along_b);
+                    to[at + refined[a]] = R::of(mean + along_a - along_b);
+                    to[at + refined[b]] = R::of(mean - along_a + along_b);
+                    to[at + refined[a] + refined[b]] = R::of(mean + along_a + along_b);
                 }
             }
         }
@@ -204,38 +204,32 @@ impl Nesting {
     /// Fills the ghosts of the tangential velocities of `to` beyond the inner sides: on the parabola
     /// through the value of the whole grid, half a cell of it outside, and the two nearest inside.
     pub fn fill_ghosts<R: Real>(&self, from: &FaceVector<R>, to: &mut FaceVector<R>) {
+        let (whole, refined) = (self.whole.strides(), self.refined.strides());
         for side in self.inner_sides() {
             let axis = side.axis;
-            let (n, cells) = (self.refined.cells[axis], self.place.cells[axis] as isize);
-            let [c, ghost, near, next] =
-                if side.side == 0 { [-1, 0, 1, 2] } else { [cells, n as isize + 1, n as isize, n as isize - 1] };
+            let n = self.refined.cells[axis];
+            let [ghost, near, next] = [[0, 1, 2], [n + 1, n, n - 1]][side.side].map(|i| i * refined[axis]);
+            let c = if side.side == 0 { -1 } else { self.place.cells[axis] as isize };
+            let layer = whole[axis] * self.position(axis, c);
             for component in (0..3).filter(|component| *component != axis) {
                 let third = 3 - axis - component;
                 let (from, to) = (from.component(component), to.component_mut(component));
                 let along = self.interpolation(component, true);
-                let across = self.interpolation(third, false);
-                for (it, pairs) in across.iter().enumerate() {
-                    for (ic, faces) in along.iter().enumerate() {
-                        let mut outside = 0.0;
-                        for (t, by_t) in pairs {
-                            for (s, by_s) in faces {
-                                let mut at = [0; 3];
-                                at[axis] = self.position(axis, c);
-                                at[third] = *t;
-                                at[component] = *s;
-                                outside += by_t * by_s * from[self.whole.index(at[0], at[1], at[2])].wide();
-                            }
-                        }
-                        let entry = |layer: isize| {
-                            let mut at = [0; 3];
-                            at[axis] = layer as usize;
-                            at[third] = it + 1;
-                            at[component] = ic + 1;
-                            self.refined.index(at[0], at[1], at[2])
+                for (row, across) in self.interpolation(third, false).iter().enumerate() {
+                    let [low, high] =
+                        across.map(|(at, weight)| (&from[layer + whole[third] * at..], weight));
+                    let row = refined[third] * (row + 1);
+                    for (face, [first, second]) in along.iter().enumerate() {
+                        let at = |(position, weight): (usize, f64)| {
+                            let at = whole[component] * position;
+                            weight * (low.1 * low.0[at].wide() + high.1 * high.0[at].wide())
                         };
-                        let (near, next) = (to[entry(near)].wide(), to[entry(next)].wide());
+                        let outside = at(*first) + at(*second);
+                        let entry = row + refined[component] * (face + 1);
+                        let (near, next) = (to[entry + near].wide(), to[entry + next].wide());
                         // Nodes at 2, -1 and -3 from the side, ghost at 1, in halves of a cell.
-                        to[entry(ghost)] = R::of((8.0 * outside + 10.0 * near - 3.0 * next) / 15.0);
+                        to[entry + ghost] =
+                            R::of((8.0 * outside + 10.0 * near - 3.0 * next) / 15.0);
                     }
                 }
             }
@@ -245,29 +239,27 @@ impl Nesting {
     /// Replaces the values of `to` on the faces inside the refined box by the means over the four
     /// refined faces on each. Faces on inner sides and walls keep theirs.
     pub fn average_faces<R: Real>(&self, axis: usize, from: &[R], to: &mut [R]) -> Gain {
-        let spans = self.periodic[axis] && self.shared[axis][0];
+        let first = [0, 1, 2].map(|along| usize::from(along == axis && !self.spanned[axis]));
         let [a, b] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| self.refined.strides()[axis]);
-        let is_inside = |axis_of: usize, c: usize| axis_of != axis || spans || c > 0;
-        let gains: Vec<Gain> = self
-            .planes(to)
-            .filter(|(k, _)| is_inside(2, *k))
-            .map(|(k, plane)| {
-                let mut gain = Gain::default();
-                for j in (0..self.place.cells[1]).filter(|j| is_inside(1, *j)) {
-                    for i in (0..self.place.cells[0]).filter(|i| is_inside(0, *i)) {
-                        let at = self.refined_position([i, j, k]);
-                        let sum = from[at].wide() + from[at + a].wide() + from[at + b].wide()
-                            + from[at + a + b].wide();
-                        let (value, mean) = (&mut plane[self.in_plane(i, j)], R::of(0.25 * sum));
-                        let (old, new) = (value.wide(), mean.wide());
-                        gain.momentum += new - old;
-                        gain.energy += 0.5 * (new * new - old * old);
-                        *value = mean;
-                    }
+        let gains = self.for_planes(to, |k, plane| {
+            let mut gain = Gain::default();
+            if k < first[2] {
+                return gain;
+            }
+            for (j, y) in self.inside(1).iter().enumerate().skip(first[1]) {
+                let row = &mut plane[y * self.whole.row()..];
+                let faces = self.rows([0, j, k], [0, a, b, a + b], from).zip(self.inside(0));
+                for (pairs, x) in faces.skip(first[0]) {
+                    let [p, q, r, s] = pairs.map(|pair| pair[0].wide());
+                    let mean = R::of(0.25 * ((p + q) + (r + s)));
+                    let (old, new) = (row[*x].wide(), mean.wide());
+                    gain.momentum += new - old;
+                    gain.energy += 0.5 * (new * new - old * old);
+                    row[*x] = mean;
                 }
-                gain
-            })
-            .collect();
+            }
+            gain
+        });
         let mut total = Gain::default();
         for gain in gains {
             total.momentum += self.cell_volume * gain.momentum;
@@ -280,68 +272,66 @@ impl Nesting {
     /// in each, after a shift of `from` by one value. The shift leaves the mean of `to` over the
     /// outermost of these cells as it was.
     pub fn average_cells<R: Real>(&self, from: &mut [R], to: &mut [R]) {
-        let strides = self.refined.strides();
-        let mean = |from: &[R], at: usize| {
-            let mut sum = 0.0;
-            for corner in 0..8 {
-                let steps = [corner & 1, corner >> 1 & 1, corner >> 2];
-                let offset: usize = (0..3).map(|axis| steps[axis] * strides[axis]).sum();
-                sum += from[at + offset].wide();
-            }
-            0.125 * sum
-        };
-        let last = self.place.cells.map(|n| n - 1);
-        let differences: Vec<[f64; 2]> = self
-            .planes(to)
-            .map(|(k, plane)| {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for j in 0..=last[1] {
-                    for i in 0..=last[0] {
-                        let outermost = [i, j, k].iter().zip(last).any(|(c, last)| *c == 0 || *c == last);
-                        if outermost {
-                            let refined = mean(from, self.refined_position([i, j, k]));
-                            sum += plane[self.in_plane(i, j)].wide() - refined;
-                            count += 1.0;
-                        }
+        let [_, a, b] = self.refined.strides();
+        let is_end = |axis: usize, c: usize| c == 0 || c + 1 == self.place.cells[axis];
+        let differences = self.for_planes(to, |k, plane| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (j, y) in self.inside(1).iter().enumerate() {
+                let row = &mut plane[y * self.whole.row()..];
+                let cells = self.rows([0, j, k], [0, a, b, a + b], from);
+                for (i, (pairs, x)) in cells.zip(self.inside(0)).enumerate() {
+                    let [p, q, r, s] = pairs.map(|[lower, upper]| lower.wide() + upper.wide());
+                    let mean = 0.125 * ((p + q) + (r + s));
+                    if is_end(0, i) || is_end(1, j) || is_end(2, k) {
+                        sum += row[*x].wide() - mean;
+                        count += 1.0;
                     }
+                    row[*x] = R::of(mean);
                 }
-                [sum, count]
-            })
-            .collect();
-        let [sum, count] = differences.iter().fold([0.0; 2], |[s, c], [t, d]| [s + t, c + d]);
-        let shift = R::of(sum / count);
-        from.par_chunks_mut(self.refined.plane()).for_each(|plane| {
-            plane.iter_mut().for_each(|value| *value = *value + shift);
+            }
+            [sum, count]
         });
-        let from = &*from;
-        self.planes(to).for_each(|(k, plane)| {
-            for j in 0..=last[1] {
-                for i in 0..=last[0] {
-                    plane[self.in_plane(i, j)] = R::of(mean(from, self.refined_position([i, j, k])));
-                }
+        let [sum, count] = differences.iter().fold([0.0; 2], |[s, c], [t, d]| [s + t, c + d]);
+        let shift = sum / count;
+        let shifted = |value: &mut R| *value = R::of(value.wide() + shift);
+        from.par_chunks_mut(self.refined.plane()).for_each(|plane| {
+            plane.iter_mut().for_each(shifted);
+        });
+        self.for_planes(to, |_, plane| {
+            for y in self.inside(1) {
+                let row = &mut plane[y * self.whole.row()..];
+                self.inside(0).iter().for_each(|x| shifted(&mut row[*x]));
             }
         });
     }
 
-    /// Planes of a field of the whole grid inside the refined box, with their index c.
-    fn planes<'a, R: Real>(
+    /// Calls `f(k, plane)` for the planes of a field of the whole grid inside the refined box,
+    /// counted from 0. Returns the results in the order of the planes in memory.
+    fn for_planes<R: Real, T: Send>(
         &self,
-        values: &'a mut [R],
-    ) -> impl ParallelIterator<Item = (usize, &'a mut [R])> + use<'a, '_, R> {
-        let planes = values.par_chunks_exact_mut(self.whole.plane()).enumerate();
-        planes.filter_map(|(k, plane)| Some((self.relative(2, k)?, plane)))
+        values: &mut [R],
+        f: impl Fn(usize, &mut [R]) -> T + Sync,
+    ) -> Vec<T> {
+        let mut order = vec![None; self.whole.cells[2] + 2];
+        for (k, at) in self.inside(2).iter().enumerate() {
+            order[*at] = Some(k);
+        }
+        let planes = values.par_chunks_exact_mut(self.whole.plane()).zip(order);
+        planes.filter_map(|(plane, k)| Some(f(k?, plane))).collect()
     }
 
-    /// Position of cell (i, j) of the refined box in a plane of the whole grid.
-    fn in_plane(&self, i: usize, j: usize) -> usize {
-        let (i, j) = (self.position(0, i as isize), self.position(1, j as isize));
-        j * self.whole.row() + i
-    }
-
-    /// Position in memory of the lowest refined cell in cell (i, j, k) of the refined box.
-    fn refined_position(&self, cell: [usize; 3]) -> usize {
+    /// Pairs of refined entries along x, one pair for each cell in the row that begins with `cell`,
+    /// in four rows at the given offsets in memory.
+    fn rows<R: Real>(
+        &self,
+        cell: [usize; 3],
+        offsets: [usize; 4],
+        from: &[R],
+    ) -> impl Iterator<Item = [[R; RATIO]; 4]> {
         let [i, j, k] = cell.map(|c| RATIO * c + 1);
-        self.refined.index(i, j, k)
+        let (start, count) = (self.refined.index(i, j, k), RATIO * self.place.cells[0]);
+        let [p, q, r, s] = offsets.map(|offset| from[start + offset..][..count].as_chunks().0);
+        p.iter().zip(q).zip(r).zip(s).map(|(((p, q), r), s)| [*p, *q, *r, *s])
     }
 
     /// Entry of this refined grid at the position `at` of another refined grid; none outside it.

@@ -14,6 +14,8 @@ mod plan;
 mod plane;
 mod tridiagonal;
 
+use std::ops::Add;
+
 use rayon::prelude::*;
 
 use crate::grid::{Mesh, columns_of, planes_of};
@@ -43,6 +45,17 @@ pub struct PoissonTimes {
     pub columns: TimeSpent,
     /// Inverse transforms and the caller's use of the solution.
     pub inverse: TimeSpent,
+}
+
+impl Add for PoissonTimes {
+    type Output = PoissonTimes;
+    fn add(self, other: PoissonTimes) -> PoissonTimes {
+        PoissonTimes {
+            forward: self.forward + other.forward,
+            columns: self.columns + other.columns,
+            inverse: self.inverse + other.inverse,
+        }
+    }
 }
 
 /// One plane of the solution and its neighbours, ghosts included. Beyond an end of the box the

@@ -52,7 +52,7 @@ pub(super) trait Fluid: Send + Sync {
     fn vorticity_at(&self, cell: [usize; 3]) -> DVec3;
     /// Velocity [m/s] at a point; `None` outside the box.
     fn interpolate_velocity(&self, x: DVec3) -> Option<DVec3>;
-    /// Wall time that the Poisson solver of the whole box has spent in each of its stages.
+    /// Wall time that the Poisson solvers have spent in each of their stages.
     fn poisson_times(&self) -> PoissonTimes;
     /// Memory held [bytes].
     fn bytes(&self) -> usize;
@@ -178,7 +178,7 @@ where
         self.probe().interpolate_velocity(x)
     }
     fn poisson_times(&self) -> PoissonTimes {
-        self.flow.whole.poisson_times()
+        self.flow.poisson_times()
     }
     fn bytes(&self) -> usize {
         self.flow.flows().map(Flow::bytes).sum::<usize>() + self.grains.bytes()
