@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::path::Path;
+
 use common::{DRY, STUDY, folder, plan, problems};
 use grainwake_study::{Selection, Study};
 
@@ -325,4 +327,21 @@ fn a_billion_models_are_refused_at_once() {
     let text = format!("title = \"large\"\nbase = \"case.toml\"\n{}{ensemble}", axis("a"));
     let found = problems(&text);
     assert!(found[0].message.contains("1000000 runs"), "{}", found[0]);
+}
+
+#[test]
+fn the_studies_of_the_repository_expand() {
+    let studies = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies");
+    // 65 models on three grids with 8 members each; the trailing grain has a gap, no position.
+    let expected = [
+        ("dkt-morphology/study.toml", 65),
+        ("dkt-morphology/quick.toml", 65),
+        ("dkt-morphology/finest.toml", 4),
+        ("dkt-morphology/ensemble.toml", 1560),
+        ("release-places/study.toml", 1800),
+    ];
+    for (name, count) in expected {
+        let runs = plan(&studies.join(name)).map(|plan| plan.runs.len());
+        assert_eq!(runs.ok(), Some(count), "{name}");
+    }
 }

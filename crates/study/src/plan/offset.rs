@@ -116,10 +116,12 @@ impl Draw {
     }
 }
 
-/// Returns the number of grains to which the case file gives a position; they come first.
+/// Returns the number of grains to which the case file gives a position, or a gap above another
+/// grain; they come first.
 fn placed_grains(case: &Case) -> usize {
+    let gives = |grain: usize, key: &str| case.gives(&format!("grain.{grain}.{key}"));
     (0..case.setup.grains.len())
-        .take_while(|grain| case.gives(&format!("grain.{grain}.position")))
+        .take_while(|grain| gives(*grain, "position") || gives(*grain, "gap_above"))
         .count()
 }
 
