@@ -60,15 +60,16 @@ impl<R: Real> NestedFlow<R> {
     pub fn refine(&mut self, place: RefinedBox) {
         let whole = &self.whole;
         let nesting = Nesting::new(&whole.mesh, &whole.boundaries, place);
-        let (mesh, boundaries) =
-            (place.mesh(&whole.mesh), nesting.boundaries(&whole.boundaries));
+        let (mesh, boundaries) = (place.mesh(&whole.mesh), nesting.boundaries(&whole.boundaries));
         let old = self.refined.take().map(|Refined { flow, nesting }| {
             let fields = flow.state().0.map(<[R]>::to_vec);
             (flow, nesting, fields)
         });
         let (mut flow, old) = match old {
             // A box of the same size keeps its Poisson solver.
-            Some((flow, of_old, fields)) if flow.mesh.cells == mesh.cells && flow.boundaries == boundaries => {
+            Some((flow, of_old, fields))
+                if flow.mesh.cells == mesh.cells && flow.boundaries == boundaries =>
+            {
                 (Flow { mesh, ..flow }, Some((of_old, fields)))
             }
             old => {
@@ -176,3 +177,6 @@ impl<R: Real> NestedFlow<R> {
         std::iter::once(&mut self.whole).chain(refined)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -150,7 +150,8 @@ impl Nesting {
     ) {
         let pairs = [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis)));
         let (whole, row) = (self.whole, self.refined.row());
-        let planes = to.par_chunks_exact_mut(self.refined.plane()).skip(1).zip(&pairs[2]).enumerate();
+        let planes =
+            to.par_chunks_exact_mut(self.refined.plane()).skip(1).zip(&pairs[2]).enumerate();
         planes.for_each(|(k, (plane, zs))| {
             for (j, ys) in pairs[1].iter().enumerate() {
                 for (i, xs) in pairs[0].iter().enumerate() {
@@ -208,7 +209,8 @@ impl Nesting {
         for side in self.inner_sides() {
             let axis = side.axis;
             let n = self.refined.cells[axis];
-            let [ghost, near, next] = [[0, 1, 2], [n + 1, n, n - 1]][side.side].map(|i| i * refined[axis]);
+            let [ghost, near, next] =
+                [[0, 1, 2], [n + 1, n, n - 1]][side.side].map(|i| i * refined[axis]);
             let c = if side.side == 0 { -1 } else { self.place.cells[axis] as isize };
             let layer = whole[axis] * self.position(axis, c);
             for component in (0..3).filter(|component| *component != axis) {

@@ -91,6 +91,14 @@ impl OpenSides {
         &self.crossings
     }
 
+    /// First grain with a part beyond a free surface.
+    pub fn emerged(&self) -> Option<usize> {
+        let emerged = |crossing: &Crossing| {
+            matches!(crossing, Crossing::Emerged(_) | Crossing::Departing(Some(_)))
+        };
+        self.crossings.iter().position(emerged)
+    }
+
     /// Impulse on the fluid in the last step [N s] of a grain that crosses a side; none of another.
     pub fn impulse_across(&self, grain: usize) -> Option<DVec3> {
         let crosses = !matches!(self.crossings[grain], Crossing::Inside);

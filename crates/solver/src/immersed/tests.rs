@@ -5,7 +5,7 @@ use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
 use crate::dem::{Grain, GrainKinematics};
-use crate::flow::{NestedFlow, Boundaries, Boundary, Flow, FluidParams};
+use crate::flow::{Boundaries, Boundary, Flow, FluidParams, NestedFlow};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
 

@@ -75,8 +75,11 @@ fn place(
     let mut result = RefinedBox { corner: [0; 3], cells: mesh.cells };
     for axis in 0..3 {
         let (n, periodic) = (mesh.cells[axis], boundaries.is_periodic(axis));
-        let (low, high) =
-            if periodic { (low[axis], high[axis]) } else { (low[axis].max(0.0), high[axis].min(n as f64)) };
+        let (low, high) = if periodic {
+            (low[axis], high[axis])
+        } else {
+            (low[axis].max(0.0), high[axis].min(n as f64))
+        };
         let wanted = fast_count((high - low).ceil() as usize + SLACK);
         if wanted >= n {
             continue;
@@ -121,7 +124,8 @@ mod tests {
     use grainwake_shape::Shape;
     use std::sync::Arc;
 
-    const MESH: Mesh = Mesh { cells: [40, 40, 80], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
+    const MESH: Mesh =
+        Mesh { cells: [40, 40, 80], spacing: DVec3::splat(0.125), origin: DVec3::ZERO };
 
     /// Box around spheres of diameter 1 at the given positions.
     fn placed(positions: &[[f64; 3]], side: Boundary, present: Option<RefinedBox>) -> RefinedBox {

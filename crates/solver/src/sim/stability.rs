@@ -6,6 +6,7 @@ use super::Simulation;
 use crate::dem::{
     ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, Side, outside,
 };
+use crate::immersed::OpenSides;
 
 /// Overlap for which a stiffness is suggested [smaller equivalent diameters].
 const SUGGESTED_OVERLAP: f64 = 0.01;
@@ -21,6 +22,8 @@ pub enum Remedy {
     GridOrStepOrSlices,
     /// An open face farther away, or an end of the run before a grain reaches it.
     FartherFace,
+    /// A run without a refined box.
+    Unrefined,
     /// A stiffer contact, at which the overlap would be 1 % of the smaller diameter.
     StifferContact {
         /// Force law.
@@ -69,6 +72,7 @@ impl Remedy {
                      {smaller_step}"
                 )
             }
+            Remedy::Unrefined => "smaller cells instead of the refinement".into(),
             Remedy::StifferContact { law, factor, value } => {
                 let (term, unit) = match law {
                     ContactLawKind::Linear => (terms.stiffness, "N/m"),
@@ -117,7 +121,7 @@ impl StepError {
 
 fn symptom(time: f64, step: u64, what: &str, remedy: &Remedy) -> String {
     let failure = match remedy {
-        Remedy::StifferContact { .. } => "the run was stopped",
+        Remedy::StifferContact { .. } | Remedy::Unrefined => "the run was stopped",
         _ => "the run became unstable",
     };
     format!("{failure} at t = {time:.6e} s (step {step}): {what}")
@@ -147,6 +151,12 @@ impl Simulation {
         }
         if let Some((what, remedy)) = self.excessive_overlap() {
             return unstable(what, remedy);
+        }
+        let emerged = self.open_sides.as_ref().and_then(OpenSides::emerged);
+        if let Some(grain) = emerged.filter(|_| self.setup.refinement > 1) {
+            let what =
+                format!("grain {grain} reaches the free surface, where the grid cannot be refined");
+            return unstable(what, Remedy::Unrefined);
         }
         if let Some(fluid) = &self.fluid {
             let measures = fluid.measures();
