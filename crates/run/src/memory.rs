@@ -12,6 +12,8 @@ use crate::error::RunError;
 
 /// Numbers of the fields and of the Poisson solver per cell. `grainwake bench` measures the bytes.
 const NUMBERS_PER_CELL: f64 = 13.75;
+/// Numbers of the copy of a refined box while it moves, per cell.
+const NUMBERS_PER_COPIED_CELL: f64 = 7.0;
 /// Bytes of the forced faces of a grain over the square of its diameter in cells, from
 /// `grainwake bench --grains 300`.
 const BYTES_PER_SURFACE_CELL: f64 = 1200.0;
@@ -31,11 +33,13 @@ pub(crate) fn needed(setup: &Setup) -> u64 {
     let refined = setup.refined_mesh();
     // The number of cells of an absurd box exceeds any integer.
     let count = |mesh: &Mesh| mesh.cells.iter().map(|n| *n as f64).product::<f64>();
-    let cells = count(&setup.mesh) + refined.as_ref().map_or(0.0, count);
+    let refined_cells = refined.as_ref().map_or(0.0, count);
     let finest = refined.as_ref().unwrap_or(&setup.mesh);
     let mut bytes = 0.0;
     if setup.fluid.is_some() {
-        bytes += cells * setup.precision.bytes() as f64 * NUMBERS_PER_CELL;
+        let numbers = (count(&setup.mesh) + refined_cells) * NUMBERS_PER_CELL
+            + refined_cells * NUMBERS_PER_COPIED_CELL;
+        bytes += numbers * setup.precision.bytes() as f64;
         bytes += surface_cells(setup) * BYTES_PER_SURFACE_CELL;
     }
     // Grains of equal shape share it.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use grainwake_shape::{Shape, ShapeOptions, analytic};
-use grainwake_solver::dem::{ContactParams, Grain};
+use grainwake_solver::dem::{ContactParams, Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
@@ -118,11 +118,14 @@ fn momentum_is_conserved_up_to_the_sides_of_the_box() {
 
 #[test]
 fn a_refined_run_is_restored_with_the_same_bits_on_any_threads() {
-    for precision in [Precision::Double, Precision::Single] {
+    let outflow = [Boundary::Outflow, Boundary::WALL];
+    for (precision, sides) in
+        [(Precision::Double, WALLS), (Precision::Single, WALLS), (Precision::Double, outflow)]
+    {
         let case = || {
             let grains = vec![sphere(2.0, [1.0, 1.1, 3.2]), ellipsoid(2.0, [1.2, 1.0, 1.9])];
             let mut case = setup([2, 2, 4], 6, 0.02, grains).with_refinement(2);
-            case = case.with_boundaries([PERIODIC, WALLS, WALLS]).with_precision(precision);
+            case = case.with_boundaries([PERIODIC, WALLS, sides]).with_precision(precision);
             Simulation::new(case).unwrap()
         };
         let run = || {
@@ -150,6 +153,74 @@ fn a_refined_run_is_restored_with_the_same_bits_on_any_threads() {
     }
 }
 
+/// Loads on grains with prescribed velocities in fluid at rest, in every step from t = 1 on.
+fn loads_on_moved(case: Setup, velocities: &[DVec3], end: f64) -> Vec<Vec<DVec3>> {
+    let mut case = case.with_gravity(DVec3::ZERO).with_step(StepRule::Fixed(0.008));
+    for (grain, velocity) in case.grains.iter_mut().zip(velocities) {
+        grain.translation = MotionConstraint::Prescribed(*velocity);
+    }
+    let mut sim = Simulation::new(case).unwrap();
+    let mut loads = Vec::new();
+    while sim.time() < end {
+        step(&mut sim);
+        if sim.time() > 1.0 {
+            loads.push(sim.loads().iter().map(|load| load.force).collect());
+        }
+    }
+    loads
+}
+
+/// Largest second difference of the force on the first grain.
+fn roughness(loads: &[Vec<DVec3>]) -> f64 {
+    let second = |three: &[Vec<DVec3>]| (three[0][0] - 2.0 * three[1][0] + three[2][0]).length();
+    loads.windows(3).map(second).fold(0.0, f64::max)
+}
+
+/// Two grains that part along a periodic axis: the box grows until it spans the axis, when they
+/// have travelled most of a period.
+#[test]
+fn a_box_that_begins_to_span_a_periodic_axis_keeps_the_flow() {
+    let velocities = [DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.0, -1.4)];
+    let case = |across| {
+        let grains = vec![sphere(2.0, [1.5, 1.5, 4.0]), sphere(2.0, [1.5, 1.5, 2.6])];
+        setup([3, 3, 5], across, 0.05, grains).with_boundaries([WALLS, WALLS, PERIODIC])
+    };
+    let refined = loads_on_moved(case(6).with_refinement(2), &velocities, 4.0);
+    let fine = loads_on_moved(case(12), &velocities, 4.0);
+    for (refined, fine) in refined.iter().zip(&fine) {
+        for (refined, fine) in refined.iter().zip(fine) {
+            let difference = (*refined - *fine).length() / fine.length();
+            assert!(difference < 0.03, "{refined} and {fine}");
+        }
+    }
+}
+
+#[test]
+fn a_box_as_wide_as_a_periodic_box_pushes_no_grain_sideways() {
+    let velocity = [DVec3::new(0.0, 0.0, -1.0)];
+    // The grain lies on the sides of the box, and the refined box moves along z.
+    let case = setup([2, 2, 7], 6, 0.02, vec![sphere(2.0, [0.0, 1.0, 6.0])]).with_refinement(2);
+    let loads = loads_on_moved(case.with_boundaries([PERIODIC, PERIODIC, WALLS]), &velocity, 4.0);
+    for load in &loads {
+        let force = load[0];
+        assert!(force.truncate().length() < 1e-6 * force.z, "{force}");
+    }
+    assert!(roughness(&loads) < 8e-3 * loads[0][0].z, "{}", roughness(&loads) / loads[0][0].z);
+}
+
+#[test]
+fn the_force_is_smooth_when_the_box_slides_along_a_wall() {
+    let velocity = [DVec3::new(0.0, 0.0, -1.0)];
+    let roughness_at = |x: f64| {
+        let case = setup([3, 3, 7], 6, 0.02, vec![sphere(2.0, [x, 1.5, 6.0])]).with_refinement(2);
+        let loads = loads_on_moved(case, &velocity, 4.0);
+        roughness(&loads) / loads[0][0].length()
+    };
+    let (beside, middle) = (roughness_at(0.6), roughness_at(1.5));
+    println!("second difference over the force: {beside:.1e} beside a wall, {middle:.1e} away");
+    assert!(beside < 8e-3 && middle < 8e-3, "{beside} and {middle}");
+}
+
 #[test]
 fn a_state_with_an_impossible_box_is_refused() {
     let case = |refinement| {
@@ -163,11 +234,13 @@ fn a_state_with_an_impossible_box_is_refused() {
     let (corner, cells) = (0u64.to_le_bytes(), 12u64.to_le_bytes());
     let here = [corner, cells, corner, cells].concat();
     let at = state.windows(here.len()).position(|window| window == here).expect("the box");
-    for wrong in [u64::MAX, 0, 13, 1 << 40] {
-        let mut damaged = state.clone();
-        damaged[at + 8..at + 16].copy_from_slice(&wrong.to_le_bytes());
-        let error = case(2).restore(&mut &damaged[..]).unwrap_err();
-        assert_eq!(error.kind(), std::io::ErrorKind::InvalidData, "{error}");
+    for number in [at, at + 8] {
+        for wrong in [u64::MAX, 1 << 63, 13, 1 << 40] {
+            let mut damaged = state.clone();
+            damaged[number..number + 8].copy_from_slice(&wrong.to_le_bytes());
+            let error = case(2).restore(&mut &damaged[..]).unwrap_err();
+            assert_eq!(error.kind(), std::io::ErrorKind::InvalidData, "{error}");
+        }
     }
     assert!(case(1).restore(&mut &state[..]).is_err(), "another refinement");
 }

@@ -12,7 +12,7 @@
 //! same flux on both grids. Momentum is conserved up to the difference of the two grids in the
 //! stresses on these sides (`docs/decisions/0027-refined-box.md`).
 
-use super::transfer::{Nesting, RefinedBox};
+use super::transfer::{Nesting, RATIO, RefinedBox};
 use super::{Flow, FlowMeasures, FluidParams};
 use crate::math::Real;
 use crate::poisson::PoissonTimes;
@@ -61,37 +61,36 @@ impl<R: Real> NestedFlow<R> {
         let whole = &self.whole;
         let nesting = Nesting::new(&whole.mesh, &whole.boundaries, place);
         let (mesh, boundaries) = (place.mesh(&whole.mesh), nesting.boundaries(&whole.boundaries));
-        let old = self.refined.take().map(|Refined { flow, nesting }| {
-            let fields = flow.state().0.map(<[R]>::to_vec);
-            (flow, nesting, fields)
-        });
-        let (mut flow, old) = match old {
-            // A box of the same size keeps its Poisson solver.
-            Some((flow, of_old, fields))
-                if flow.mesh.cells == mesh.cells && flow.boundaries == boundaries =>
-            {
-                (Flow { mesh, ..flow }, Some((of_old, fields)))
+        let (mut reused, mut old) = (None, None);
+        if let Some(Refined { flow, nesting: of_old }) = self.refined.take() {
+            old = Some((of_old, flow.state().0.map(<[R]>::to_vec)));
+            if flow.mesh.cells == mesh.cells && flow.boundaries == boundaries {
+                // A box of the same size keeps its Poisson solver.
+                reused = Some(Flow { mesh, ..flow });
+            } else {
+                self.past_times = self.past_times + flow.poisson_times();
             }
-            old => {
-                if let Some((flow, ..)) = &old {
-                    self.past_times = self.past_times + flow.poisson_times();
-                }
-                let flow = Flow::new(&mesh, boundaries, &self.params);
-                (flow, old.map(|(_, of_old, fields)| (of_old, fields)))
-            }
-        };
+        }
+        let mut flow = reused.unwrap_or_else(|| Flow::new(&mesh, boundaries, &self.params));
         let last_step = whole.previous_step.unwrap_or(0.0);
         let ((from, _), (to, _)) = (whole.state(), flow.state_mut(last_step));
         for (field, (from, to)) in from.into_iter().zip(to).enumerate() {
             let component = (field < 6).then_some(field % 3);
-            // The tendency is not known on the sides.
-            let with_sides = field < 3;
-            nesting.interpolate(component, from, to, |at| {
+            // The tendency has no ghosts and is not known on the sides, the pressure has no slope
+            // there.
+            let is_velocity = field < 3;
+            nesting.interpolate(component, !is_velocity, from, to, |at| {
                 let (of_old, fields) = old.as_ref()?;
-                Some(fields[field][of_old.common_entry(&nesting, component, with_sides, at)?])
+                Some(fields[field][of_old.common_entry(&nesting, component, is_velocity, at)?])
             });
         }
+        nesting.divide_velocity(&whole.velocity, &mut flow.velocity, |c| {
+            let at = c.map(|c| RATIO * c + 1);
+            !old.as_ref()
+                .is_some_and(|(of_old, _)| of_old.common_entry(&nesting, None, false, at).is_some())
+        });
         flow.fill_ghosts();
+        flow.fill_pressure_ghosts();
         nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
         self.refined = Some(Refined { flow, nesting });
     }
@@ -120,7 +119,6 @@ impl<R: Real> NestedFlow<R> {
         let mut measures = whole.project(dt);
         nesting.set_sides(&whole.velocity, &mut flow.predicted);
         let refined = flow.project(dt);
-        nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
         for axis in 0..3 {
             let (from, to) = (flow.velocity.component(axis), whole.velocity.component_mut(axis));
             let gain = nesting.average_faces(axis, from, to);
@@ -130,6 +128,7 @@ impl<R: Real> NestedFlow<R> {
         nesting.average_cells(&mut flow.pressure, &mut whole.pressure);
         whole.fill_ghosts();
         whole.fill_pressure_ghosts();
+        nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
         measures.max_divergence = measures.max_divergence.max(refined.max_divergence);
         measures.max_rate = measures.max_rate.max(refined.max_rate);
         measures.max_velocity = measures.max_velocity.max(refined.max_velocity);

@@ -52,10 +52,25 @@ pub struct Nesting {
     cell_volume: f64,
     /// Sides of the refined box on a wall of the whole box, or periodic with the opposite one.
     shared: [[bool; 2]; 3],
+    periodic: [bool; 3],
     /// Periodic axes along which the refined box spans the whole box.
     spanned: [bool; 3],
     /// Positions on the whole grid along each axis of the cells c from -1 to the number of cells.
     positions: [Vec<usize>; 3],
+}
+
+/// Lower and upper halves along two axes.
+const HALVES: [[usize; 2]; 4] = [[0, 0], [1, 0], [0, 1], [1, 1]];
+
+/// Calls `f` for all cells of a box, counted from 0.
+fn for_cells(cells: [usize; 3], mut f: impl FnMut([usize; 3])) {
+    for k in 0..cells[2] {
+        for j in 0..cells[1] {
+            for i in 0..cells[0] {
+                f([i, j, k]);
+            }
+        }
+    }
 }
 
 /// Two positions along an axis and their weights.
@@ -90,6 +105,7 @@ impl Nesting {
             refined: place.mesh(whole).layout(),
             cell_volume: whole.cell_volume(),
             shared,
+            periodic: boundaries.periodic(),
             spanned: [0, 1, 2].map(|axis| boundaries.is_periodic(axis) && shared[axis][0]),
             positions,
         }
@@ -123,8 +139,10 @@ impl Nesting {
     }
 
     /// Positions on the whole grid and weights of the linear interpolation to each position of the
-    /// refined grid along `axis`, from 1 on; `on_faces` includes the upper side.
-    fn interpolation(&self, axis: usize, on_faces: bool) -> Vec<Pair> {
+    /// refined grid along `axis`, from 1 on; `on_faces` includes the upper side. Beyond the ends of
+    /// an axis that is not periodic, ghosts are used or, if `extrapolated`, the two nearest unknown
+    /// values.
+    fn interpolation(&self, axis: usize, on_faces: bool, extrapolated: bool) -> Vec<Pair> {
         let count = self.refined.cells[axis] as isize;
         let whole = |c| self.position(axis, c);
         let pair = |f: isize| {
@@ -136,19 +154,37 @@ impl Nesting {
                 (false, true) => [(whole(c), 0.75), (whole(c + 1), 0.25)],
             }
         };
-        (0..count + isize::from(on_faces)).map(pair).collect()
+        let n = self.whole.cells[axis];
+        let unknown = 1 + usize::from(on_faces)..=n;
+        let pairs = (0..count + isize::from(on_faces)).map(pair);
+        if !extrapolated || self.periodic[axis] || unknown.clone().count() < 2 {
+            return pairs.collect();
+        }
+        let extrapolate = |pair: Pair| {
+            if pair.iter().all(|(at, _)| unknown.contains(at)) {
+                return pair;
+            }
+            let at: f64 = pair.iter().map(|(at, weight)| *at as f64 * weight).sum();
+            let lower = if pair[0].0 + pair[1].0 < n { *unknown.start() } else { n - 1 };
+            let upper_weight = at - lower as f64;
+            [(lower, 1.0 - upper_weight), (lower + 1, upper_weight)]
+        };
+        pairs.map(extrapolate).collect()
     }
 
     /// Fills a refined field by linear interpolation; `component` is that of a field on faces.
-    /// Entries that `kept` gives take its value instead.
+    /// Entries that `kept` gives take its value instead. A field without ghosts on the sides of the
+    /// whole box is `extrapolated` there.
     pub fn interpolate<R: Real>(
         &self,
         component: Option<usize>,
+        extrapolated: bool,
         from: &[R],
         to: &mut [R],
         kept: impl Fn([usize; 3]) -> Option<R> + Sync,
     ) {
-        let pairs = [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis)));
+        let pairs =
+            [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis), extrapolated));
         let (whole, row) = (self.whole, self.refined.row());
         let planes =
             to.par_chunks_exact_mut(self.refined.plane()).skip(1).zip(&pairs[2]).enumerate();
@@ -173,33 +209,111 @@ impl Nesting {
         });
     }
 
-    /// Sets the normal velocity of `to` on the inner sides. Each face of the whole grid is divided
-    /// into four faces with the same flux in all, linear in the position.
+    /// Normal velocities of the four refined faces on the lower face of cell `c` along `axis`, by
+    /// lower and upper half along the two axes after it. They are linear in the position and have
+    /// the flux of the face.
+    fn quarters<R: Real>(&self, axis: usize, from: &FaceVector<R>, c: [usize; 3]) -> [[f64; 2]; 2] {
+        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let value = |da: isize, db: isize| {
+            let mut at = [0; 3];
+            at[axis] = self.position(axis, c[axis] as isize);
+            at[a] = self.position(a, c[a] as isize + da);
+            at[b] = self.position(b, c[b] as isize + db);
+            from.component(axis)[self.whole.index(at[0], at[1], at[2])].wide()
+        };
+        let mean = value(0, 0);
+        let along_a = 0.125 * (value(1, 0) - value(-1, 0));
+        let along_b = 0.125 * (value(0, 1) - value(0, -1));
+        [
+            [mean - along_a - along_b, mean - along_a + along_b],
+            [mean + along_a - along_b, mean + along_a + along_b],
+        ]
+    }
+
+    /// Position in memory of the refined face `half` along the two axes after `axis` on the lower
+    /// face of cell `c`.
+    fn quarter_position(&self, axis: usize, c: [usize; 3], half: [usize; 2]) -> usize {
+        let mut at = c.map(|c| RATIO * c + 1);
+        at[(axis + 1) % 3] += half[0];
+        at[(axis + 2) % 3] += half[1];
+        self.refined.index(at[0], at[1], at[2])
+    }
+
+    /// Sets the normal velocity of `to` on the inner sides from that of the whole grid.
     pub fn set_sides<R: Real>(&self, from: &FaceVector<R>, to: &mut FaceVector<R>) {
-        let (whole, refined) = (self.whole.strides(), self.refined.strides());
         for side in self.inner_sides() {
             let axis = side.axis;
-            let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-            let (from, to) = (from.component(axis), to.component_mut(axis));
-            let c = if side.side == 0 { 0 } else { self.place.cells[axis] };
-            let layer = whole[axis] * self.position(axis, c as isize);
-            let lowest = refined[axis] * (RATIO * c + 1) + refined[a] + refined[b];
-            for (cb, at_b) in self.positions[b].windows(3).enumerate() {
-                for (ca, at_a) in self.positions[a].windows(3).enumerate() {
-                    let value = |i: usize, j: usize| {
-                        from[layer + whole[a] * at_a[i] + whole[b] * at_b[j]].wide()
-                    };
-                    let mean = value(1, 1);
-                    let along_a = 0.125 * (value(2, 1) - value(0, 1));
-                    let along_b = 0.125 * (value(1, 2) - value(1, 0));
-                    let at = lowest + RATIO * (refined[a] * ca + refined[b] * cb);
-                    to[at] = R::of(mean - along_a - along_b);
-                    to[at + refined[a]] = R::of(mean + along_a - along_b);
-                    to[at + refined[b]] = R::of(mean - along_a + along_b);
-                    to[at + refined[a] + refined[b]] = R::of(mean + along_a + along_b);
+            let mut layer = self.place.cells;
+            layer[axis] = 1;
+            for_cells(layer, |mut c| {
+                c[axis] = if side.side == 0 { 0 } else { self.place.cells[axis] };
+                self.set_quarters(axis, from, to, c);
+            });
+        }
+    }
+
+    /// Sets the refined faces on the lower face of cell `c` and returns their values.
+    fn set_quarters<R: Real>(
+        &self,
+        axis: usize,
+        from: &FaceVector<R>,
+        to: &mut FaceVector<R>,
+        c: [usize; 3],
+    ) -> [[f64; 2]; 2] {
+        let values = self.quarters(axis, from, c);
+        for half in HALVES {
+            let at = self.quarter_position(axis, c, half);
+            to.component_mut(axis)[at] = R::of(values[half[0]][half[1]]);
+        }
+        values
+    }
+
+    /// Sets the velocity of `to` in the cells of the refined box that `is_new` selects. On the faces
+    /// of the whole grid it is that of [`Self::quarters`]. Inside its cells it is the one by Toth and
+    /// Roe (2002), whose divergence is that of the whole grid in all eight refined cells. The
+    /// spacing must be the same along all axes.
+    pub fn divide_velocity<R: Real>(
+        &self,
+        from: &FaceVector<R>,
+        to: &mut FaceVector<R>,
+        is_new: impl Fn([usize; 3]) -> bool,
+    ) {
+        let sign = |half: usize| 2.0 * half as f64 - 1.0;
+        for_cells(self.place.cells, |c| {
+            if !is_new(c) {
+                return;
+            }
+            // q[axis][side][half along axis + 1][half along axis + 2].
+            let q = [0, 1, 2].map(|axis| {
+                let mut upper = c;
+                upper[axis] += 1;
+                [c, upper].map(|c| self.set_quarters(axis, from, to, c))
+            });
+            // Sums of q over its faces, weighted with the signs of side and of one half or both.
+            let sum = |axis: usize, weight: &dyn Fn(f64, f64) -> f64| {
+                let mut sum = 0.0;
+                for side in 0..2 {
+                    for [a, b] in HALVES {
+                        sum += sign(side) * weight(sign(a), sign(b)) * q[axis][side][a][b];
+                    }
+                }
+                0.125 * sum
+            };
+            let with_first = [0, 1, 2].map(|axis| sum(axis, &|a, _| a));
+            let with_second = [0, 1, 2].map(|axis| sum(axis, &|_, b| b));
+            let with_both = [0, 1, 2].map(|axis| 0.5 * sum(axis, &|a, b| a * b));
+            for axis in 0..3 {
+                let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+                for [ha, hb] in HALVES {
+                    let mean = 0.5 * (q[axis][0][ha][hb] + q[axis][1][ha][hb]);
+                    let curved = with_second[a] + with_first[b];
+                    let twisted = sign(hb) * with_both[a] + sign(ha) * with_both[b];
+                    let at =
+                        self.quarter_position(axis, c, [ha, hb]) + self.refined.strides()[axis];
+                    to.component_mut(axis)[at] = R::of(mean + curved + twisted);
                 }
             }
-        }
+        });
     }
 
     /// Fills the ghosts of the tangential velocities of `to` beyond the inner sides: on the parabola
@@ -216,8 +330,8 @@ impl Nesting {
             for component in (0..3).filter(|component| *component != axis) {
                 let third = 3 - axis - component;
                 let (from, to) = (from.component(component), to.component_mut(component));
-                let along = self.interpolation(component, true);
-                for (row, across) in self.interpolation(third, false).iter().enumerate() {
+                let along = self.interpolation(component, true, false);
+                for (row, across) in self.interpolation(third, false, false).iter().enumerate() {
                     let [low, high] =
                         across.map(|(at, weight)| (&from[layer + whole[third] * at..], weight));
                     let row = refined[third] * (row + 1);
@@ -272,10 +386,13 @@ impl Nesting {
 
     /// Replaces the cells of `to` inside the refined box by the means over the eight refined cells
     /// in each, after a shift of `from` by one value. The shift leaves the mean of `to` over the
-    /// outermost of these cells as it was.
+    /// cells at inner sides as it was.
     pub fn average_cells<R: Real>(&self, from: &mut [R], to: &mut [R]) {
         let [_, a, b] = self.refined.strides();
-        let is_end = |axis: usize, c: usize| c == 0 || c + 1 == self.place.cells[axis];
+        let at_inner_side = |axis: usize, c: usize| {
+            let ends = [c == 0, c + 1 == self.place.cells[axis]];
+            (0..2).any(|side| ends[side] && !self.shared[axis][side])
+        };
         let differences = self.for_planes(to, |k, plane| {
             let (mut sum, mut count) = (0.0, 0.0);
             for (j, y) in self.inside(1).iter().enumerate() {
@@ -284,7 +401,7 @@ impl Nesting {
                 for (i, (pairs, x)) in cells.zip(self.inside(0)).enumerate() {
                     let [p, q, r, s] = pairs.map(|[lower, upper]| lower.wide() + upper.wide());
                     let mean = 0.125 * ((p + q) + (r + s));
-                    if is_end(0, i) || is_end(1, j) || is_end(2, k) {
+                    if at_inner_side(0, i) || at_inner_side(1, j) || at_inner_side(2, k) {
                         sum += row[*x].wide() - mean;
                         count += 1.0;
                     }
@@ -294,7 +411,7 @@ impl Nesting {
             [sum, count]
         });
         let [sum, count] = differences.iter().fold([0.0; 2], |[s, c], [t, d]| [s + t, c + d]);
-        let shift = sum / count;
+        let shift = sum / f64::max(count, 1.0);
         let shifted = |value: &mut R| *value = R::of(value.wide() + shift);
         from.par_chunks_mut(self.refined.plane()).for_each(|plane| {
             plane.iter_mut().for_each(shifted);
@@ -336,21 +453,25 @@ impl Nesting {
         p.iter().zip(q).zip(r).zip(s).map(|(((p, q), r), s)| [*p, *q, *r, *s])
     }
 
-    /// Entry of this refined grid at the position `at` of another refined grid; none outside it.
-    /// For a component on faces its own axis includes the sides if `sides` is set.
+    /// Entry of this refined grid at the position `at` of another refined grid in the same box; none
+    /// outside it. A component on faces includes those on the sides if `with_sides` is set.
     pub fn common_entry(
         &self,
         other: &Nesting,
         component: Option<usize>,
-        sides: bool,
+        with_sides: bool,
         at: [usize; 3],
     ) -> Option<usize> {
         let mut here = [0; 3];
         for axis in 0..3 {
-            let shift = RATIO as isize * (other.place.corner[axis] - self.place.corner[axis]);
-            let index = at[axis] as isize + shift;
-            let (n, normal) = (self.refined.cells[axis] as isize, component == Some(axis));
-            let range = match (normal, sides) {
+            let shift = other.place.corner[axis] - self.place.corner[axis];
+            let mut index = at[axis] as isize + RATIO as isize * shift;
+            let n = self.refined.cells[axis] as isize;
+            if self.periodic[axis] {
+                let period = (RATIO * self.whole.cells[axis]) as isize;
+                index = 1 + (index - 1).rem_euclid(period);
+            }
+            let range = match (component == Some(axis) && !self.spanned[axis], with_sides) {
                 (true, true) => 1..=n + 1,
                 (true, false) => 2..=n,
                 (false, _) => 1..=n,

@@ -17,7 +17,7 @@ const SLACK: usize = 2;
 /// Cells beyond a new box from which on a box is replaced by a smaller one.
 const EXCESS: usize = 8;
 /// Largest distance of a refined box from the box of a periodic axis [cells].
-const FAR: isize = 1 << 40;
+const FAR: usize = 1 << 40;
 
 /// Refined box at t = 0; none if the set-up asks for none or has no grains in a fluid.
 pub fn first_box(setup: &Setup) -> Option<RefinedBox> {
@@ -45,7 +45,7 @@ pub fn is_possible(mesh: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> b
     (0..3).all(|axis| {
         let (corner, cells, n) = (place.corner[axis], place.cells[axis], mesh.cells[axis]);
         let fits = if boundaries.is_periodic(axis) {
-            corner.abs() < FAR
+            corner.unsigned_abs() < FAR
         } else {
             corner >= 0 && cells <= n && corner <= (n - cells) as isize
         };
@@ -86,14 +86,15 @@ fn place(
         }
         if let Some(present) = present {
             let (corner, cells) = (present.corner[axis], present.cells[axis]);
-            let holds = corner as f64 <= low && (corner + cells as isize) as f64 >= high;
+            let inside = corner as f64 <= low && (corner + cells as isize) as f64 >= high;
+            let holds = inside || (periodic && cells == n);
             if holds && cells <= wanted + EXCESS {
                 (result.corner[axis], result.cells[axis]) = (corner, cells);
                 continue;
             }
         }
         // A box that is large enough keeps its size.
-        let kept = present.map(|present| present.cells[axis]);
+        let kept = present.map(|present| present.cells[axis]).filter(|kept| *kept < n);
         let cells = kept.filter(|kept| (wanted..=wanted + EXCESS).contains(kept)).unwrap_or(wanted);
         let corner = (0.5 * (low + high - cells as f64)).round() as isize;
         let last = (n - cells) as isize;
@@ -165,6 +166,8 @@ mod tests {
         assert_eq!(two.cells, [18, 18, 50]);
         let all = placed(&[[0.6, 2.5, 1.0], [4.4, 2.5, 9.0]], Boundary::Periodic, None);
         assert_eq!((all.cells, all.corner), ([40, 18, 80], [0, 11, 0]));
+        let kept = placed(&[[2.5, 2.5, 2.0], [2.5, 2.5, 9.9]], Boundary::Periodic, Some(all));
+        assert_eq!((kept.cells[2], kept.corner[2]), (80, 0));
         // It shrinks when the grains have met.
         let met = placed(&[[2.5, 2.5, 2.0], [2.5, 2.5, 3.0]], Boundary::WALL, Some(two));
         assert_eq!(met.cells, [18, 18, 25]);

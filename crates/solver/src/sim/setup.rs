@@ -157,7 +157,7 @@ impl Setup {
 
     /// Spacing of the grid around the grains [m].
     pub fn finest_spacing(&self) -> DVec3 {
-        self.mesh.spacing / self.refinement as f64
+        self.refined_mesh().map_or(self.mesh.spacing, |mesh| mesh.spacing)
     }
 
     /// Grid of the refined box at t = 0, if there is one.

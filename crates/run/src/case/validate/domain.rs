@@ -134,13 +134,13 @@ fn divide(
     Some(cells)
 }
 
-/// Returns the refinement around the grains.
+/// Returns the refinement around the grains of a case, which may be `dry` and `empty` of grains.
 pub(super) fn refinement(
     check: &mut Checker,
     raw: &RawDomain,
     coupling: &RawCoupling,
     mesh: &Mesh,
-    dry: bool,
+    [dry, empty]: [bool; 2],
 ) -> usize {
     let Some(refinement) = &raw.refinement else { return 1 };
     let mut fail = |message: String, help: &str| check.fail(&refinement.span, message, help);
@@ -149,6 +149,10 @@ pub(super) fn refinement(
         2 if dry => {
             let help = "leave out refinement, or add [fluid]";
             fail("a case without a fluid has no grid to refine".into(), help);
+        }
+        2 if empty => {
+            let help = "leave out refinement, or add [[grain]]";
+            fail("there is no grain around which the grid could be refined".into(), help);
         }
         2 if coupling.scheme.value == Scheme::Paper => {
             let help = "leave out refinement, or the scheme";

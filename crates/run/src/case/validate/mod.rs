@@ -130,7 +130,8 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     } else {
         None
     };
-    let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, dry);
+    let state = [dry, grains.is_empty()];
+    let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, state);
     let spacing = mesh.spacing / refinement.max(1) as f64;
     let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, dry);
     let setup = Setup::new(mesh)

@@ -151,3 +151,35 @@ fn the_refined_grid_gives_the_means_of_the_whole_grid() {
     }
     assert_eq!(compared, 3 * 6 * 8 * 5);
 }
+
+#[test]
+fn a_refined_box_begins_with_the_divergence_of_the_whole_grid() {
+    let nu = 0.01;
+    let mut flow = nested(16, Boundaries([PERIODIC; 3]), nu, BOX, vortices(0.0, nu));
+    // Noise of the size of a cell, made divergence-free on the whole grid.
+    let mut state = 7_u64;
+    for axis in 0..3 {
+        for value in flow.whole.velocity.component_mut(axis).iter_mut() {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            *value += (state >> 11) as f64 / (1u64 << 53) as f64;
+        }
+    }
+    flow.whole.make_solenoidal();
+    flow.refine(RefinedBox { corner: [-9, 1, 11], cells: [6, 8, 5] });
+    let (u, mesh) = (&flow.finest().velocity, flow.finest().mesh());
+    let (layout, h) = (mesh.layout(), mesh.spacing.x);
+    let mut largest = 0.0_f64;
+    for k in 1..=mesh.cells[2] {
+        for j in 1..=mesh.cells[1] {
+            for i in 1..=mesh.cells[0] {
+                let flux = |axis: usize| {
+                    let at = layout.index(i, j, k);
+                    let q = u.component(axis);
+                    q[at + layout.strides()[axis]] - q[at]
+                };
+                largest = largest.max((flux(0) + flux(1) + flux(2)).abs() / h);
+            }
+        }
+    }
+    assert!(largest < 1e-10, "divergence {largest:e}");
+}
