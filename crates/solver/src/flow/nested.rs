@@ -84,11 +84,12 @@ impl<R: Real> NestedFlow<R> {
                 Some(fields[field][of_old.common_entry(&nesting, component, is_velocity, at)?])
             });
         }
-        nesting.divide_velocity(&whole.velocity, &mut flow.velocity, |c| {
+        let is_new = |c: [usize; 3]| {
             let at = c.map(|c| RATIO * c + 1);
-            !old.as_ref()
-                .is_some_and(|(of_old, _)| of_old.common_entry(&nesting, None, false, at).is_some())
-        });
+            let common = |of_old: &Nesting| of_old.common_entry(&nesting, None, false, at);
+            old.as_ref().and_then(|(of_old, _)| common(of_old)).is_none()
+        };
+        nesting.divide_velocity(&whole.velocity, &mut flow.velocity, is_new);
         flow.fill_ghosts();
         flow.fill_pressure_ghosts();
         nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
