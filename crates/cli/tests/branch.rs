@@ -175,6 +175,7 @@ fn what_a_checkpoint_fixes_may_not_differ() {
         ("domain.cell_size=1 mm", "domain.cell_size", "8 x 8 x 24 cells"),
         ("domain.boundaries.x=\"wall\"", "domain.boundaries.x", "normal to x"),
         ("domain.origin=[0, 0, \"-1 mm\"]", "domain.origin", "begins at"),
+        ("domain.refinement=2", "domain.refinement", "refinement is 2, and that of the parent"),
         ("run.precision=\"f32\"", "run.precision", "precision"),
         ("grain.0.nodes=300", "grain.0.nodes", "grain 0 has another set of surface nodes"),
         ("grain.0.shape.diameter=\"1.9 mm\"", "grain.0.shape", "grain 0 has another shape"),

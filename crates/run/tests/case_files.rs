@@ -987,6 +987,37 @@ fn a_grain_starts_impulsively_or_released() {
 }
 
 #[test]
+fn the_grid_is_refined_around_the_grains() {
+    let refined = PAIR.replace("[time]", "refinement = 2\n[time]");
+    let (plain, fine) = (good(PAIR), good(&refined));
+    assert_eq!((plain.setup.refinement, fine.setup.refinement), (1, 2));
+    assert!(fine.resolved.contains("refinement = 2") && !plain.resolved.contains("refinement"));
+    let (plain, fine) = (plain.estimate(1), fine.estimate(1));
+    // 8 cells across, 3.2 on each side and 2 of slack; 12 cells and a diameter higher for the pair.
+    assert_eq!((plain.refined_cells, fine.refined_cells), (None, Some(36 * 36 * 80)));
+    assert_eq!((plain.cells_per_diameter, fine.cells_per_diameter), (Some(8.0), Some(16.0)));
+    let ratio = fine.steps as f64 / plain.steps as f64;
+    assert!((1.8..2.2).contains(&ratio), "{ratio}");
+    let more = (fine.memory_bytes - plain.memory_bytes) as f64 / (36.0 * 36.0 * 80.0 * 8.0);
+    assert!((20.0..30.0).contains(&more), "{more} numbers a cell");
+    assert!(fine.wall_s > 2.0 * plain.wall_s);
+    let coarse = |text: &str| good(text).estimate(1).warnings.join("\n");
+    assert!(coarse(PAIR).contains("set refinement = 2"));
+    assert!(!coarse(&refined).contains("set refinement = 2"));
+    let key = "domain.refinement";
+    refused("[time]", "refinement = 3\n[time]", key, &["found 3", "2 halves"]);
+    let paper = "refinement = 2\n[coupling]\nscheme = \"paper\"\n[time]";
+    refused("[time]", paper, key, &["paper's scheme", "leave out"]);
+    let flat = "size = [\"25 mm\", \"0.25 mm\", \"97.5 mm\"]\nrefinement = 2\n\
+        boundaries = { y = \"periodic\" }";
+    refused("size = [\"25 mm\", \"25 mm\", \"97.5 mm\"]", flat, key, &["y is flat"]);
+    let dry = refined.replace("[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n", "");
+    assert!(problems(&dry)[0].to_string().contains("no grid to refine"));
+    let empty = &refined[..refined.find("[[grain]]").unwrap()];
+    assert!(problems(empty)[0].to_string().contains("no grain around which"));
+}
+
+#[test]
 fn hertz_mindlin_takes_materials_from_the_grain_or_from_contact() {
     let case = good(HERTZ);
     let materials: Vec<_> = case.setup.grains.iter().map(|g| g.material).collect();
