@@ -8,19 +8,21 @@
 
 mod boundary;
 mod nested;
+mod nesting;
 mod open_boundary;
 mod prediction;
 mod project;
+mod prolongation;
+mod restriction;
 #[cfg(test)]
 mod tests;
-mod transfer;
 
 pub use boundary::{Boundaries, Boundary};
 pub(crate) use nested::NestedFlow;
+pub(crate) use nesting::RefinedBox;
 pub(crate) use open_boundary::{BoxSide, CoveredFace};
 pub(crate) use prediction::{OldState, Prediction};
 pub(crate) use project::FlowMeasures;
-pub(crate) use transfer::RefinedBox;
 
 use glam::DVec3;
 use rayon::prelude::*;

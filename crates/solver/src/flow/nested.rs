@@ -12,7 +12,7 @@
 //! same flux on both grids. Momentum is conserved up to the difference of the two grids in the
 //! stresses on these sides (`docs/decisions/0027-refined-box.md`).
 
-use super::transfer::{Nesting, RATIO, RefinedBox};
+use super::nesting::{Nesting, RATIO, RefinedBox};
 use super::{Flow, FlowMeasures, FluidParams};
 use crate::math::Real;
 use crate::poisson::PoissonTimes;
