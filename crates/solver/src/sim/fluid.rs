@@ -91,7 +91,7 @@ impl<R: Real> FluidOf<R> {
         }
         let mut flow = NestedFlow::new(whole, params);
         let mut followed = Vec::new();
-        if let Some(place) = refinement::first_box(setup) {
+        if let Some(place) = setup.refined_box() {
             flow.refine(place);
             followed = setup.grains.clone();
         }

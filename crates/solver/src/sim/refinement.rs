@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::Setup;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, RefinedBox};
 use crate::grid::Mesh;
@@ -19,11 +18,9 @@ const EXCESS: usize = 8;
 /// Largest distance of a refined box from the box of a periodic axis [cells].
 const FAR: usize = 1 << 40;
 
-/// Refined box at t = 0; none if the set-up asks for none or has no grains in a fluid.
-pub fn first_box(setup: &Setup) -> Option<RefinedBox> {
-    let needed = setup.refinement > 1 && setup.fluid.is_some();
-    let needed = needed.then(|| needed_range(&setup.mesh, &setup.grains)).flatten()?;
-    Some(place(&setup.mesh, &setup.boundaries, needed, None))
+/// Refined box around grains; none without grains.
+pub fn first_box(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Option<RefinedBox> {
+    Some(place(mesh, boundaries, needed_range(mesh, grains)?, None))
 }
 
 /// Refined box for grains at their present poses, which is the `present` one as long as it holds

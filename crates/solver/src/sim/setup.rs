@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::dem::{ContactParams, Enclosure, Grain, Side};
-use crate::flow::{Boundaries, Boundary, FluidParams};
+use crate::flow::{Boundaries, Boundary, FluidParams, RefinedBox};
 use crate::grid::Mesh;
 use crate::immersed::{Scheme, Start};
 use crate::math::Precision;
@@ -160,9 +160,16 @@ impl Setup {
         self.refined_mesh().map_or(self.mesh.spacing, |mesh| mesh.spacing)
     }
 
-    /// Grid of the refined box at t = 0, if there is one.
+    /// Refined box around the present grains, if the set-up has one.
+    pub(super) fn refined_box(&self) -> Option<RefinedBox> {
+        let is_refined = self.refinement > 1 && self.fluid.is_some();
+        let place = || refinement::first_box(&self.mesh, &self.boundaries, &self.grains);
+        is_refined.then(place).flatten()
+    }
+
+    /// Grid of the refined box around the present grains, if the set-up has one.
     pub fn refined_mesh(&self) -> Option<Mesh> {
-        refinement::first_box(self).map(|place| place.mesh(&self.mesh))
+        self.refined_box().map(|place| place.mesh(&self.mesh))
     }
 
     /// Walls and periodic axes of the box for contact.
