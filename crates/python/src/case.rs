@@ -147,6 +147,8 @@ impl PyCase {
     ///     Edge lengths of the box [m].
     /// cell_size : float or str
     ///     Edge of a cell [m].
+    /// refinement : int, optional
+    ///     2 halves the cells in a box that follows the grains; 1 by default.
     /// end : float or str
     ///     End of the run [s].
     /// grains : sequence of dict, default ()
@@ -170,12 +172,13 @@ impl PyCase {
     /// -------
     /// Case
     #[staticmethod]
-    #[pyo3(signature = (*, size, cell_size, end, grains = None, fluid = None, gravity = None, boundaries = None, title = None, folder = PathBuf::from("."), **tables))]
+    #[pyo3(signature = (*, size, cell_size, end, refinement = None, grains = None, fluid = None, gravity = None, boundaries = None, title = None, folder = PathBuf::from("."), **tables))]
     fn new(
         py: Python<'_>,
         size: &Bound<'_, PyAny>,
         cell_size: &Bound<'_, PyAny>,
         end: &Bound<'_, PyAny>,
+        refinement: Option<usize>,
         grains: Option<&Bound<'_, PyAny>>,
         fluid: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
@@ -187,6 +190,7 @@ impl PyCase {
         let domain = PyDict::new(py);
         domain.set_item("size", size)?;
         domain.set_item("cell_size", cell_size)?;
+        domain.set_item("refinement", refinement)?;
         domain.set_item("boundaries", boundaries)?;
         let time = PyDict::new(py);
         time.set_item("end", end)?;

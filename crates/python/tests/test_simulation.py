@@ -32,6 +32,24 @@ def test_a_run_yields_states_at_its_times(sim):
     assert sim.time == pytest.approx(0.01) and sim.steps == states[-1].steps
 
 
+def test_a_refined_box_follows_a_grain(case_file):
+    refined = gw.Case.load(case_file, {"domain.refinement": 2})
+    coarse, fine = gw.Simulation(gw.Case.load(case_file)), gw.Simulation(refined)
+    for simulation in (coarse, fine):
+        simulation.advance_to("10 ms")
+    # Half the step; arrays have the cells of the whole box.
+    assert fine.steps > 1.5 * coarse.steps
+    assert fine.fluid_velocity("z").shape == coarse.fluid_velocity("z").shape
+    difference = fine.velocities[0, 2] / coarse.velocities[0, 2] - 1
+    assert 0 < abs(difference) < 0.05
+    keywords = dict(size=[1, 1, 2], cell_size=0.125, end=1,
+                    fluid={"density": 1, "viscosity": 0.1},
+                    grains=[gw.Grain.sphere(0.5).at([0.5, 0.5, 1], density=2)])
+    assert "refinement = 2" in gw.Case.new(refinement=2, **keywords).resolved
+    with pytest.raises(gw.CaseError, match="found 3"):
+        gw.Case.new(refinement=3, **keywords)
+
+
 def test_states_continue_after_a_break(sim):
     for state in sim.run(every="2 ms", progress=False):
         if state.time > 3e-3:

@@ -233,6 +233,7 @@ class Case:
         size: _Vector,
         cell_size: _Quantity | _Vector,
         end: _Quantity,
+        refinement: int | None = None,
         grains: Sequence[Mapping[str, Any]] | None = None,
         fluid: Mapping[str, Any] | None = None,
         gravity: _Vector | None = None,
