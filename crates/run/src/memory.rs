@@ -23,7 +23,8 @@ const BYTES_PER_NODE: f64 = 400.0;
 /// Returns the sum of the squares of the diameters in cells, to which the work and memory of the
 /// coupling are proportional.
 pub(crate) fn surface_cells(setup: &Setup) -> f64 {
-    let across = |diameter: f64| diameter / setup.finest_spacing().min_element();
+    let spacing = setup.finest_spacing().min_element();
+    let across = |diameter: f64| diameter / spacing;
     setup.grains.iter().map(|grain| across(grain.shape.equivalent_diameter()).powi(2)).sum()
 }
 

@@ -63,7 +63,7 @@ fn motion_in_a_refined_box_is_that_of_the_fine_grid() {
     let errors = |found: [f64; 3]| [0, 1, 2].map(|i| (found[i] - fine[i]).abs() / fine[0]);
     let (without, with) = (errors(coarse), errors(refined));
     for quantity in 0..3 {
-        assert!(with[quantity] < 0.004, "{with:?}");
+        assert!(with[quantity] < 0.002, "{with:?}");
     }
     assert!(without[0] > 5.0 * with[0], "{without:?} and {with:?}");
 }
@@ -113,7 +113,7 @@ fn residual(across: usize) -> f64 {
 fn momentum_is_conserved_up_to_the_sides_of_the_box() {
     let [coarse, fine] = [6, 12].map(residual);
     println!("residual over weight: {coarse:.2e} at 6 cells, {fine:.2e} at 12");
-    assert!(coarse < 0.02 && fine < 0.5 * coarse, "{coarse} and {fine}");
+    assert!(coarse < 2e-4 && fine < 0.4 * coarse, "{coarse} and {fine}");
 }
 
 #[test]
@@ -187,12 +187,11 @@ fn a_box_that_begins_to_span_a_periodic_axis_keeps_the_flow() {
     };
     let refined = loads_on_moved(case(6).with_refinement(2), &velocities, 4.0);
     let fine = loads_on_moved(case(12), &velocities, 4.0);
-    for (refined, fine) in refined.iter().zip(&fine) {
-        for (refined, fine) in refined.iter().zip(fine) {
-            let difference = (*refined - *fine).length() / fine.length();
-            assert!(difference < 0.03, "{refined} and {fine}");
-        }
-    }
+    let pairs = refined.iter().flatten().zip(fine.iter().flatten());
+    let differences = pairs.map(|(refined, fine)| (*refined - *fine).length() / fine.length());
+    let largest = differences.fold(0.0, f64::max);
+    println!("largest difference of a force from the fine grid: {largest:.2e}");
+    assert!(largest < 0.005, "{largest}");
 }
 
 #[test]
@@ -205,7 +204,7 @@ fn a_box_as_wide_as_a_periodic_box_pushes_no_grain_sideways() {
         let force = load[0];
         assert!(force.truncate().length() < 1e-6 * force.z, "{force}");
     }
-    assert!(roughness(&loads) < 8e-3 * loads[0][0].z, "{}", roughness(&loads) / loads[0][0].z);
+    assert!(roughness(&loads) < 6e-3 * loads[0][0].z, "{}", roughness(&loads) / loads[0][0].z);
 }
 
 #[test]
@@ -218,7 +217,7 @@ fn the_force_is_smooth_when_the_box_slides_along_a_wall() {
     };
     let (beside, middle) = (roughness_at(0.6), roughness_at(1.5));
     println!("second difference over the force: {beside:.1e} beside a wall, {middle:.1e} away");
-    assert!(beside < 8e-3 && middle < 8e-3, "{beside} and {middle}");
+    assert!(beside < 6e-3 && middle < 6e-3, "{beside} and {middle}");
 }
 
 #[test]
@@ -251,8 +250,9 @@ fn a_grain_lands_on_a_wall_and_rests() {
     let mut sim = Simulation::new(case).unwrap();
     sim.advance_to(8.0).unwrap();
     let grain = &sim.grains()[0];
-    assert!(grain.velocity.length() < 1e-3, "{}", grain.velocity);
-    assert!((grain.pose.position.z - 0.5).abs() < 0.03, "{}", grain.pose.position.z);
+    println!("speed {:.1e} at z = {:.4}", grain.velocity.length(), grain.pose.position.z);
+    assert!(grain.velocity.length() < 1e-5, "{}", grain.velocity);
+    assert!((grain.pose.position.z - 0.5).abs() < 0.02, "{}", grain.pose.position.z);
 }
 
 #[test]
@@ -270,6 +270,7 @@ fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     long.advance_to(short.time()).unwrap();
     let [short_speed, long_speed] = [&short, &long].map(|sim| sim.grains()[0].velocity.z);
     let ratio = short_speed / long_speed;
+    println!("speed at the outflow over that in a longer box: {ratio:.4}");
     assert!((ratio - 1.0).abs() < 0.015, "{short_speed} and {long_speed}");
     for _ in 0..200 {
         step(&mut short);

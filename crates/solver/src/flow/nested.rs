@@ -55,8 +55,8 @@ impl<R: Real> NestedFlow<R> {
         self.refined.as_mut().map_or(&mut self.whole, |refined| &mut refined.flow)
     }
 
-    /// Refines the box `place`. Values come from the last refined box where both overlap, and
-    /// elsewhere by linear interpolation from the whole grid.
+    /// Refines the box `place`. Where the last refined box overlaps it, the values stay. Elsewhere
+    /// the velocity has the divergence of the whole grid; tendency and pressure are interpolated.
     pub fn refine(&mut self, place: RefinedBox) {
         let whole = &self.whole;
         let nesting = Nesting::new(&whole.mesh, &whole.boundaries, place);
@@ -75,21 +75,24 @@ impl<R: Real> NestedFlow<R> {
         let last_step = whole.previous_step.unwrap_or(0.0);
         let ((from, _), (to, _)) = (whole.state(), flow.state_mut(last_step));
         for (field, (from, to)) in from.into_iter().zip(to).enumerate() {
-            let component = (field < 6).then_some(field % 3);
-            // The tendency has no ghosts and is not known on the sides, the pressure has no slope
-            // there.
-            let is_velocity = field < 3;
-            nesting.interpolate(component, !is_velocity, from, to, |at| {
+            let (is_velocity, component) = (field < 3, (field < 6).then_some(field % 3));
+            // The tendency is not known on the sides.
+            let kept = |at| {
                 let (of_old, fields) = old.as_ref()?;
                 Some(fields[field][of_old.common_entry(&nesting, component, is_velocity, at)?])
-            });
+            };
+            if is_velocity {
+                nesting.copy(component, to, kept);
+            } else {
+                nesting.interpolate(component, from, to, kept);
+            }
         }
         let is_new = |c: [usize; 3]| {
             let at = c.map(|c| RATIO * c + 1);
             let common = |of_old: &Nesting| of_old.common_entry(&nesting, None, false, at);
             old.as_ref().and_then(|(of_old, _)| common(of_old)).is_none()
         };
-        nesting.divide_velocity(&whole.velocity, &mut flow.velocity, is_new);
+        nesting.prolong_velocity(&whole.velocity, &mut flow.velocity, is_new);
         flow.fill_ghosts();
         flow.fill_pressure_ghosts();
         nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
@@ -139,9 +142,6 @@ impl<R: Real> NestedFlow<R> {
     /// Projects the velocity onto the divergence-free fields and keeps the pressure; for initial
     /// states.
     pub fn make_solenoidal(&mut self) -> FlowMeasures {
-        if self.refined.is_none() {
-            return self.whole.make_solenoidal();
-        }
         let pressures = self.flows_mut().map(|flow| flow.pressure.to_vec()).collect::<Vec<_>>();
         for flow in self.flows_mut() {
             flow.predict_present();

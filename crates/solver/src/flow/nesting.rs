@@ -1,7 +1,7 @@
 //! Place of a refined box in the grid of the whole box.
 //!
-//! Legend: c index of a cell of the whole grid counted from the lower corner of the refined box,
-//! from 0; f index on the refined grid from 0; i, j, k positions in the arrays, from 1.
+//! Legend: c index of a cell of the whole grid, counted from 0 at the lower corner of the refined
+//! box.
 
 use super::{Boundaries, Boundary, BoxSide};
 use crate::grid::{Layout, Mesh};

@@ -1,7 +1,7 @@
 //! Prolongation: values of the whole grid on a refined box.
 //!
-//! Legend: c index of a cell of the whole grid counted from the lower corner of the refined box,
-//! from 0; f index on the refined grid from 0; i, j, k positions in the arrays, from 1.
+//! Legend: c index of a cell of the whole grid, f of a cell or face of the refined grid, both
+//! counted from 0 at the lower corner of the refined box; i, j, k positions in the arrays, from 1.
 
 use rayon::prelude::*;
 
@@ -61,40 +61,59 @@ impl Nesting {
         pairs.map(extrapolate).collect()
     }
 
-    /// Fills a refined field by linear interpolation; `component` is that of a field on faces.
-    /// Entries that `kept` gives take its value instead. A field without ghosts on the sides of the
-    /// whole box is `extrapolated` there.
+    /// Calls `f(at, value)` for the entries of a refined field, in parallel; `component` is that of
+    /// a field on faces, which includes the upper side.
+    fn for_entries<R: Real>(
+        &self,
+        component: Option<usize>,
+        field: &mut [R],
+        f: impl Fn([usize; 3], &mut R) + Sync,
+    ) {
+        let layout = self.refined;
+        let last = [0, 1, 2].map(|axis| layout.cells[axis] + usize::from(component == Some(axis)));
+        let planes = field.par_chunks_exact_mut(layout.plane()).enumerate();
+        planes.filter(|(k, _)| (1..=last[2]).contains(k)).for_each(|(k, plane)| {
+            for j in 1..=last[1] {
+                let row = &mut plane[j * layout.row()..][..=last[0]];
+                row.iter_mut().enumerate().skip(1).for_each(|(i, value)| f([i, j, k], value));
+            }
+        });
+    }
+
+    /// Gives the entries of a refined field the values `kept`, if there are any.
+    pub fn copy<R: Real>(
+        &self,
+        component: Option<usize>,
+        to: &mut [R],
+        kept: impl Fn([usize; 3]) -> Option<R> + Sync,
+    ) {
+        self.for_entries(component, to, |at, value| *value = kept(at).unwrap_or(*value));
+    }
+
+    /// Gives the entries of a refined field the values `kept`, and the others values by linear
+    /// interpolation. At walls and open sides of the whole box the nearest values inside are
+    /// extrapolated, because the tendency has no ghosts and the pressure has no slope there.
     pub fn interpolate<R: Real>(
         &self,
         component: Option<usize>,
-        extrapolated: bool,
         from: &[R],
         to: &mut [R],
         kept: impl Fn([usize; 3]) -> Option<R> + Sync,
     ) {
-        let pairs =
-            [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis), extrapolated));
-        let (whole, row) = (self.whole, self.refined.row());
-        let planes =
-            to.par_chunks_exact_mut(self.refined.plane()).skip(1).zip(&pairs[2]).enumerate();
-        planes.for_each(|(k, (plane, zs))| {
-            for (j, ys) in pairs[1].iter().enumerate() {
-                for (i, xs) in pairs[0].iter().enumerate() {
-                    let value = kept([i + 1, j + 1, k + 1]).unwrap_or_else(|| {
-                        let mut sum = 0.0;
-                        for (z, by_z) in zs {
-                            for (y, by_y) in ys {
-                                for (x, by_x) in xs {
-                                    let value = from[whole.index(*x, *y, *z)].wide();
-                                    sum += by_x * by_y * by_z * value;
-                                }
-                            }
-                        }
-                        R::of(sum)
-                    });
-                    plane[(j + 1) * row + i + 1] = value;
+        let pairs = [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis), true));
+        let interpolated = |[i, j, k]: [usize; 3]| {
+            let mut sum = 0.0;
+            for (z, by_z) in pairs[2][k - 1] {
+                for (y, by_y) in pairs[1][j - 1] {
+                    for (x, by_x) in pairs[0][i - 1] {
+                        sum += by_x * by_y * by_z * from[self.whole.index(x, y, z)].wide();
+                    }
                 }
             }
+            R::of(sum)
+        };
+        self.for_entries(component, to, |at, value| {
+            *value = kept(at).unwrap_or_else(|| interpolated(at));
         });
     }
 
@@ -160,7 +179,7 @@ impl Nesting {
     /// Sets the velocity of `to` in the cells of the refined box that `is_new` selects. On the
     /// faces of the whole grid it is that of [`Self::quarters`]. Inside its cells it is the one by
     /// Toth and Roe (2002): all eight refined cells of a cubic cell have its divergence.
-    pub fn divide_velocity<R: Real>(
+    pub fn prolong_velocity<R: Real>(
         &self,
         from: &FaceVector<R>,
         to: &mut FaceVector<R>,

@@ -1,7 +1,6 @@
 //! Restriction: means over a refined box on the whole grid.
 //!
-//! Legend: c index of a cell of the whole grid counted from the lower corner of the refined box,
-//! from 0; f index on the refined grid from 0; i, j, k positions in the arrays, from 1.
+//! Legend: i, j, k cell of the whole grid, counted from 0 at the lower corner of the refined box.
 
 use rayon::prelude::*;
 

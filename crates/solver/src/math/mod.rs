@@ -1,4 +1,4 @@
-//! Mathematics shared by all layers: poses, loads, dense 6 x 6 systems, formulas.
+//! Mathematics shared by all layers: poses, loads, dense 6 x 6 systems, prime factors, formulas.
 
 mod cache;
 mod formula;
@@ -161,9 +161,27 @@ pub fn solve6(mut a: Matrix6, mut b: Vector6) -> Option<Vector6> {
     Some(b)
 }
 
+/// Returns the largest prime factor of `n`; 1 for 1.
+pub fn largest_prime_factor(mut n: usize) -> usize {
+    let (mut largest, mut factor) = (1, 2);
+    while factor * factor <= n {
+        while n.is_multiple_of(factor) {
+            (largest, n) = (factor, n / factor);
+        }
+        factor += 1;
+    }
+    largest.max(n)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn prime_factors_are_found() {
+        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime_factor);
+        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
+    }
 
     #[test]
     fn solves_a_system_with_a_zero_on_the_diagonal() {

@@ -102,7 +102,7 @@ impl<R: Real> FluidOf<R> {
         FluidOf { flow, grains, measures, followed }
     }
 
-    /// Moves the refined box if the grains have left its middle.
+    /// Moves the refined box if it no longer holds the grains and their margins.
     fn follow_grains(&mut self) {
         let Some(present) = self.flow.refined_box() else { return };
         let whole = &self.flow.whole;

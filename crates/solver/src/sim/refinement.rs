@@ -5,17 +5,18 @@ use glam::DVec3;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, RefinedBox};
 use crate::grid::Mesh;
+use crate::math::largest_prime_factor;
 
 /// Distance from the grains to the sides of the refined box, in diameters of the bounding sphere
-/// of the grain. Wider boxes give the same forces (`docs/decisions/0027-refined-box.md`).
+/// of the grain.
 const MARGIN: f64 = 0.4;
 /// Least distance from the grains to the sides of the refined box [cells of the whole grid].
 const LEAST_MARGIN: f64 = 3.0;
-/// Cells by which a new box exceeds what the grains need, so that it moves less often.
+/// Cells that a new box has beyond the margins, so that it moves less often.
 const SLACK: usize = 2;
-/// Cells beyond a new box from which on a box is replaced by a smaller one.
+/// Largest number of cells that a box may have beyond those of a new one.
 const EXCESS: usize = 8;
-/// Largest distance of a refined box from the box of a periodic axis [cells].
+/// Largest distance of a refined box from the origin along a periodic axis [cells].
 const FAR: usize = 1 << 40;
 
 /// Refined box around grains; none without grains.
@@ -37,7 +38,7 @@ pub fn next_box(
     }
 }
 
-/// Whether a box lies in the grid.
+/// Returns whether a refined box fits into the grid; that of a damaged checkpoint may not.
 pub fn is_possible(mesh: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> bool {
     (0..3).all(|axis| {
         let (corner, cells, n) = (place.corner[axis], place.cells[axis], mesh.cells[axis]);
@@ -63,6 +64,8 @@ fn needed_range(mesh: &Mesh, grains: &[Grain]) -> Option<[DVec3; 2]> {
     ranges.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)])
 }
 
+/// Refined box that holds a range of cells: the `present` one along each axis where it suffices and
+/// is not far too large, else a new one with the range in its middle.
 fn place(
     mesh: &Mesh,
     boundaries: &Boundaries,
@@ -103,16 +106,7 @@ fn place(
 
 /// Smallest count from `count` on without prime factors beyond 5, for which transforms are fast.
 fn fast_count(count: usize) -> usize {
-    let is_fast = |n: &usize| {
-        let mut n = *n;
-        for factor in [2, 3, 5] {
-            while n.is_multiple_of(factor) {
-                n /= factor;
-            }
-        }
-        n == 1
-    };
-    (count..).find(is_fast).unwrap_or(count)
+    (count..).find(|n| largest_prime_factor(*n) <= 5).unwrap_or(count)
 }
 
 #[cfg(test)]

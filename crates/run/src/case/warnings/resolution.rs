@@ -5,7 +5,7 @@ use crate::case::settling::time_step;
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::immersed::Scheme;
-use grainwake_solver::math::Precision;
+use grainwake_solver::math::{Precision, largest_prime_factor};
 use grainwake_solver::sim::{Setup, StepRule};
 
 /// Cells across the shortest axis of a grain below which forces are rough. Oblate spheroids of
@@ -58,14 +58,14 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     // The transform is a small part of the cost of a small grid.
     let large = wet && setup.mesh.cell_count() > 1_000_000;
     for (axis, &n) in setup.mesh.cells.iter().enumerate() {
-        if large && largest_prime(n) > LARGEST_CHEAP_PRIME {
-            let fast = |n: &usize| largest_prime(*n) <= 5;
+        if large && largest_prime_factor(n) > LARGEST_CHEAP_PRIME {
+            let fast = |n: &usize| largest_prime_factor(*n) <= 5;
             let below = (1..n).rev().find(fast).unwrap_or(1);
             let above = (n..).find(fast).unwrap_or(n);
             found.push(format!(
                 "{n} cells along {} have a large prime factor, {}: a step takes half as long again; {below} or {above} cells are fast",
                 AXES[axis],
-                largest_prime(n)
+                largest_prime_factor(n)
             ));
         }
     }
@@ -131,8 +131,9 @@ fn first_step(setup: &Setup) -> Option<String> {
         return None;
     };
     setup.fluid.as_ref()?;
+    let spacing = setup.finest_spacing();
     let inverse_spacing = |axis: usize| {
-        if setup.mesh.is_resolved(axis) { 1.0 / setup.finest_spacing()[axis] } else { 0.0 }
+        if setup.mesh.is_resolved(axis) { 1.0 / spacing[axis] } else { 0.0 }
     };
     let cfl = |grain: &Grain| {
         let turning = grain.angular_velocity.length() * grain.shape.bounding_radius();
@@ -153,26 +154,3 @@ fn first_step(setup: &Setup) -> Option<String> {
 
 /// Largest prime factor of a number of cells for which the Fourier transform is fast.
 const LARGEST_CHEAP_PRIME: usize = 13;
-
-/// Returns the largest prime factor of `n`; 1 for 1.
-fn largest_prime(mut n: usize) -> usize {
-    let (mut largest, mut factor) = (1, 2);
-    while factor * factor <= n {
-        while n.is_multiple_of(factor) {
-            (largest, n) = (factor, n / factor);
-        }
-        factor += 1;
-    }
-    largest.max(n)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn prime_factors_are_found() {
-        let found = [1, 2, 97, 100, 131, 390, 2 * 53].map(largest_prime);
-        assert_eq!(found, [1, 2, 97, 5, 131, 13, 53]);
-    }
-}
