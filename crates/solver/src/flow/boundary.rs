@@ -198,9 +198,6 @@ fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
 /// the rule of each end.
 fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [GhostRule; 2]) {
     let (n, step) = (layout.cells[axis], layout.strides()[axis]);
-    // Ghosts of one end: one in each row along x, else a whole row or plane.
-    let (count, apart) =
-        if axis == 0 { (values.len() / layout.row(), layout.row()) } else { (step, 1) };
     let ends = [(0, 1, 2.min(n)), (n + 1, n, n.max(2) - 1)];
     for ((ghost, near, next), rule) in ends.into_iter().zip(rules) {
         let (from, wall) = match rule {
@@ -209,12 +206,20 @@ fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [G
             GhostRule::ZeroGradient => (near, None),
             GhostRule::Wall(velocity) => (near, Some(velocity)),
         };
-        for at in (0..count).map(|index| index * apart) {
-            let value = values[at + from * step];
-            values[at + ghost * step] = match wall {
-                None => value,
-                Some(wall) => beyond_wall(wall, value, values[at + next * step], n),
-            };
+        let value = |near: R, next: R| wall.map_or(near, |wall| beyond_wall(wall, near, next, n));
+        if axis == 0 {
+            for row in values.chunks_exact_mut(layout.row()) {
+                row[ghost] = value(row[from], row[next]);
+            }
+            continue;
+        }
+        // A whole row or plane of ghosts.
+        let layer = |index: usize| index * step..(index + 1) * step;
+        values.copy_within(layer(from), ghost * step);
+        if wall.is_some()
+            && let Ok([ghosts, next]) = values.get_disjoint_mut([layer(ghost), layer(next)])
+        {
+            ghosts.iter_mut().zip(next).for_each(|(ghost, next)| *ghost = value(*ghost, *next));
         }
     }
 }

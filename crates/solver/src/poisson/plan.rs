@@ -106,9 +106,9 @@ impl ColumnScratch {
     fn new(width: usize, nz: usize, ends: Ends) -> ColumnScratch {
         let periodic = ends == Ends::Periodic && nz > 1;
         ColumnScratch {
-            values: Aligned::zeros(width * nz),
-            pivots: Aligned::zeros(width * nz),
-            corner: Aligned::zeros(if periodic { width * nz } else { 0 }),
+            values: Aligned::zeros(width * (nz + 1)),
+            pivots: Aligned::zeros(width * (nz + 1)),
+            corner: Aligned::zeros(if periodic { width * (nz + 1) } else { 0 }),
             carry: Aligned::zeros(width),
             mean: [(); 2].map(|()| vec![0.0; nz]),
         }

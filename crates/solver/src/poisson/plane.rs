@@ -301,8 +301,8 @@ impl Rows {
             }
             V::transpose(&mut re);
             V::transpose(&mut im);
-            for ((re, im), &to) in re.into_iter().zip(im).zip(order) {
-                a[to] = Complex { re, im };
+            for (n, &to) in order.iter().enumerate() {
+                a[to] = Complex { re: re[n], im: im[n] };
             }
         }
     }

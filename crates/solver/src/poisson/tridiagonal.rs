@@ -17,11 +17,11 @@ use grainwake_simd::{Kernel, Vector};
 
 /// Scratch for one block of columns.
 pub struct ColumnScratch {
-    /// Solutions y of the systems without corners, one row of columns for each k.
+    /// Solutions y of the systems without corners: a row of zeros, then one row for each k.
     pub values: Aligned<f64>,
-    /// Inverse pivots, one row for each k.
+    /// Inverse pivots, in rows as `values`.
     pub pivots: Aligned<f64>,
-    /// Solutions q for the corner vector; empty unless z is periodic.
+    /// Solutions q for the corner vector, in rows as `values`; empty unless z is periodic.
     pub corner: Aligned<f64>,
     /// One row: the solution of the plane above, or the factor of q.
     pub carry: Aligned<f64>,
@@ -68,6 +68,9 @@ impl<R: Real> Kernel for Solve<'_, '_, R> {
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
         let Solve { system, columns, lambda, singular, scratch } = self;
+        for rows in [&mut scratch.values, &mut scratch.pivots, &mut scratch.corner] {
+            rows.iter_mut().take(lambda.len()).for_each(|first| *first = 0.0);
+        }
         match system.ends {
             _ if system.n == 1 => system.solve_flat(columns, lambda),
             Ends::Neumann => system.solve_neumann::<V, R>(columns, lambda, singular, scratch),
@@ -95,12 +98,10 @@ fn starts<V: Vector>(width: usize) -> impl Iterator<Item = usize> {
     (0..width / V::WIDTH).map(|n| n * V::WIDTH)
 }
 
-/// Row k - 1 of a list of rows, empty for k = 0, and mutable row k.
+/// Rows of k - 1 and k in a list of rows that starts with a row of zeros.
 #[inline(always)]
-fn row_of(values: &mut [f64], k: usize, width: usize) -> (&[f64], &mut [f64]) {
-    let (before, rest) = values.split_at_mut(k * width);
-    let before = if k > 0 { &before[(k - 1) * width..][..width] } else { &[] };
-    (before, &mut rest[..width])
+fn rows_at(values: &mut [f64], k: usize, width: usize) -> (&mut [f64], &mut [f64]) {
+    values[k * width..][..2 * width].split_at_mut(width)
 }
 
 impl Tridiagonal {
@@ -122,37 +123,34 @@ impl Tridiagonal {
         let (n, width) = (self.n, lambda.len());
         let (one, square) = (V::constant(1.0), V::constant(self.square));
         let factor = V::constant(-self.square * self.scale);
-        let (values, pivots) = (&mut scratch.values[..n * width], &mut scratch.pivots[..n * width]);
+        let ColumnScratch { values, pivots, carry, .. } = scratch;
         for k in 0..n {
             let neighbours = u8::from(k > 0) + u8::from(k + 1 < n);
             let neighbours = V::constant(f64::from(neighbours));
             let row = &columns.row(k)[..width];
-            let (pivots_before, pivots) = row_of(pivots, k, width);
-            let (values_before, values) = row_of(values, k, width);
+            let (pivots_before, pivots) = rows_at(pivots, k, width);
+            let (values_before, values) = rows_at(values, k, width);
             for i in starts::<V>(width) {
-                let mut b = neighbours + V::load(&lambda[i..]) * square;
-                let mut f = factor * V::load_from(&row[i..]);
-                if k > 0 {
-                    b = b - V::load(&pivots_before[i..]);
-                    f = f + V::load(&values_before[i..]);
-                }
-                let pivot = one.div(b);
+                let b = neighbours + V::load(&lambda[i..]) * square;
+                let pivot = one.div(b - V::load(&pivots_before[i..]));
+                let f = factor * V::load_from(&row[i..]) + V::load(&values_before[i..]);
                 pivot.store(&mut pivots[i..]);
                 (f * pivot).store(&mut values[i..]);
             }
         }
         if singular {
             // The last pivot of the mean mode vanishes; its last value is zero for the time being.
-            values[(n - 1) * width] = 0.0;
+            values[n * width] = 0.0;
         }
-        let carry = &mut scratch.carry[..width];
-        carry.copy_from_slice(&values[(n - 1) * width..]);
+        let carry = &mut carry[..width];
+        carry.copy_from_slice(&values[n * width..][..width]);
         for (last, carry) in columns.row(n - 1).iter_mut().zip(&*carry) {
             *last = R::of(*carry);
         }
         for k in (0..n - 1).rev() {
             let row = &mut columns.row(k)[..width];
-            let (values, pivots) = (&values[k * width..][..width], &pivots[k * width..][..width]);
+            let (_, values) = rows_at(values, k, width);
+            let (_, pivots) = rows_at(pivots, k, width);
             for i in starts::<V>(width) {
                 let x = V::load(&values[i..]) + V::load(&pivots[i..]) * V::load(&carry[i..]);
                 x.store(&mut carry[i..]);
@@ -175,6 +173,9 @@ impl Tridiagonal {
         // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
         for k in 0..n {
             let row = &columns.row(k)[..width];
+            let (pivots_before, pivots) = rows_at(pivots, k, width);
+            let (values_before, values) = rows_at(values, k, width);
+            let (corner_before, corner) = rows_at(corner, k, width);
             for i in starts::<V>(width) {
                 let b = two + V::load(&lambda[i..]) * square;
                 let g = zero - b;
@@ -185,42 +186,40 @@ impl Tridiagonal {
                 if k + 1 == n {
                     (diagonal, u) = (diagonal - one.div(g), u - one);
                 }
-                let (before, y, q) = if k == 0 {
-                    (zero, zero, zero)
-                } else {
-                    let at = (k - 1) * width + i;
-                    (V::load(&pivots[at..]), V::load(&values[at..]), V::load(&corner[at..]))
-                };
-                let pivot = one.div(diagonal - before);
-                let at = k * width + i;
-                pivot.store(&mut pivots[at..]);
-                ((factor * V::load_from(&row[i..]) + y) * pivot).store(&mut values[at..]);
-                ((u + q) * pivot).store(&mut corner[at..]);
+                let pivot = one.div(diagonal - V::load(&pivots_before[i..]));
+                let f = factor * V::load_from(&row[i..]) + V::load(&values_before[i..]);
+                let u = u + V::load(&corner_before[i..]);
+                pivot.store(&mut pivots[i..]);
+                (f * pivot).store(&mut values[i..]);
+                (u * pivot).store(&mut corner[i..]);
             }
         }
-        for k in (0..n - 1).rev() {
+        for k in (1..n).rev() {
+            let (_, pivots) = rows_at(pivots, k - 1, width);
+            let (values, values_after) = rows_at(&mut values[width..], k - 1, width);
+            let (corner, corner_after) = rows_at(&mut corner[width..], k - 1, width);
             for i in starts::<V>(width) {
-                let (at, after) = (k * width + i, (k + 1) * width + i);
-                let pivot = V::load(&pivots[at..]);
-                (V::load(&values[at..]) + pivot * V::load(&values[after..]))
-                    .store(&mut values[at..]);
-                (V::load(&corner[at..]) + pivot * V::load(&corner[after..]))
-                    .store(&mut corner[at..]);
+                let pivot = V::load(&pivots[i..]);
+                let y = V::load(&values[i..]) + pivot * V::load(&values_after[i..]);
+                let q = V::load(&corner[i..]) + pivot * V::load(&corner_after[i..]);
+                y.store(&mut values[i..]);
+                q.store(&mut corner[i..]);
             }
         }
         let share = &mut carry[..width];
-        let last = (n - 1) * width;
+        let [y, q] = [&*values, &*corner].map(|rows| [&rows[width..], &rows[n * width..]]);
         for i in starts::<V>(width) {
             let g = zero - (two + V::load(&lambda[i..]) * square);
-            let y = V::load(&values[i..]) - V::load(&values[last + i..]).div(g);
-            let q = one + V::load(&corner[i..]) - V::load(&corner[last + i..]).div(g);
-            y.div(q).store(&mut share[i..]);
+            let [y, y_end] = y.map(|row| V::load(&row[i..]));
+            let [q, q_end] = q.map(|row| V::load(&row[i..]));
+            (y - y_end.div(g)).div(one + q - q_end.div(g)).store(&mut share[i..]);
         }
         for k in 0..n {
-            let row = columns.row(k);
+            let row = &mut columns.row(k)[..width];
+            let (_, values) = rows_at(values, k, width);
+            let (_, corner) = rows_at(corner, k, width);
             for i in starts::<V>(width) {
-                let at = k * width + i;
-                let x = V::load(&values[at..]) - V::load(&share[i..]) * V::load(&corner[at..]);
+                let x = V::load(&values[i..]) - V::load(&share[i..]) * V::load(&corner[i..]);
                 x.store_to(&mut row[i..]);
             }
         }
