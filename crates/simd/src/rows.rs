@@ -1,5 +1,7 @@
 //! Loops along rows, and sums in an order that does not depend on the width of the registers.
 
+use std::ops::Range;
+
 use super::{MAX_LANES, Real, Scalar, Vector};
 
 /// Computation along a row, one vector of neighbouring entries at a time.
@@ -34,11 +36,20 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
     }
 }
 
-/// Whether the `width` entries from `i` on contain neither end of a row of `n` entries; one
-/// comparison.
-#[inline(always)]
-pub fn inside_row(i: usize, width: usize, n: usize) -> bool {
-    i.wrapping_sub(2) < n.saturating_sub(width + 1)
+/// Whole cache lines of a row among entries 2 to n - 1, if the widest vectors of [`along_row`] tile
+/// them; entry 0 of `row` is the ghost below entry 1.
+///
+/// Non-temporal stores are for whole lines: a line that also gets an ordinary store is written to
+/// memory in part and read back, which makes a step up to five times as long.
+#[inline]
+pub fn inner_lines<V: Vector>(row: &[V::Number], n: usize) -> Range<usize> {
+    let line = V::Number::LANES;
+    let offset = row[1..].as_ptr().align_offset(line * V::Number::BYTES);
+    if !offset.is_multiple_of(V::WIDTH) {
+        return 0..0;
+    }
+    let first = 1 + if offset > 0 { offset } else { line };
+    first..first + n.saturating_sub(first) / line * line
 }
 
 /// Slice of the `V::WIDTH` entries from `at` on and one neighbour on each side.

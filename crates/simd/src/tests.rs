@@ -1,5 +1,7 @@
 //! Every vector against plain numbers.
 
+use std::ops::Range;
+
 use super::plain::Plain;
 use super::*;
 
@@ -194,13 +196,53 @@ fn every_entry_of_a_row_is_treated_once_and_summed_alike() {
     }
 }
 
-#[test]
-fn vectors_inside_a_row_contain_neither_end() {
-    for n in 0..20 {
-        for (i, width) in (1..25).flat_map(|i| [1, 4, 8].map(|width| (i, width))) {
-            assert_eq!(inside_row(i, width, n), i > 1 && i + width <= n, "{i} {width} {n}");
+/// Marks the entries of a row of `n` that are written with non-temporal stores.
+struct Streamed<'a, R> {
+    n: usize,
+    lines: Range<usize>,
+    row: &'a mut [R],
+}
+
+impl<R: Real> RowWork for Streamed<'_, R> {
+    type Number = R;
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
+        if self.lines.contains(&i) {
+            assert!(self.row[i..].as_ptr().addr().is_multiple_of(V::WIDTH * R::BYTES));
+            self.row[i..i + V::WIDTH].fill(R::of(1.0));
         }
     }
+}
+
+impl<R: Real> Kernel for Streamed<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(mut self) {
+        self.lines = inner_lines::<V>(self.row, self.n);
+        along_row::<V>(self.n, &mut self);
+    }
+}
+
+#[test]
+fn lines_of_non_temporal_stores_are_whole_and_inside_a_row() {
+    fn count<R: Real>(n: usize, head: usize, run: impl Fn(Streamed<R>)) -> usize {
+        let mut list = Aligned::<R>::zeros((head + n + 2).next_multiple_of(R::LANES));
+        run(Streamed { n, lines: 0..0, row: &mut list[head..head + n + 2] });
+        assert!(list[head + 1].wide() + list[head + n].wide() == 0.0);
+        let lines = list.chunks_exact(R::LANES);
+        assert!(lines.clone().all(|line| line.iter().all(|x| x.wide() == line[0].wide())));
+        lines.filter(|line| line[0].wide() > 0.0).count()
+    }
+    fn check<R: Real>() {
+        for (n, head) in (1..70).flat_map(|n| (0..R::LANES).map(move |head| (n, head))) {
+            count::<R>(n, head, |work| work.run::<R::Baseline>());
+            count::<R>(n, head, |work| dispatch(work));
+        }
+        // Entry 1 starts a line: all lines but those of the ends.
+        assert_eq!(count::<R>(5 * R::LANES, R::LANES - 1, |work| dispatch(work)), 3);
+        assert_eq!(count::<R>(5 * R::LANES + 2, R::LANES - 1, |work| dispatch(work)), 4);
+    }
+    check::<f64>();
+    check::<f32>();
 }
 
 /// Reads and writes at the end of a list.

@@ -18,7 +18,7 @@ use super::{Boundaries, Flow};
 use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
 use grainwake_simd::{
-    Kernel, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, window, window_mut,
 };
 
 /// Constants of the tendency.
@@ -116,6 +116,9 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
         let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
         for j in 1..=layout.cells[1] {
+            let predicted =
+                [layout.row_of_mut(px, j), layout.row_of_mut(py, j), layout.row_of_mut(pz, j)];
+            let streamed = if self.non_temporal { inner_lines::<V>(predicted[0], n) } else { 0..0 };
             let mut work = PredictRow {
                 coefficients,
                 weights,
@@ -128,14 +131,10 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                     layout.row_of_mut(ty, j),
                     layout.row_of_mut(tz, j),
                 ],
-                predicted: [
-                    layout.row_of_mut(px, j),
-                    layout.row_of_mut(py, j),
-                    layout.row_of_mut(pz, j),
-                ],
+                predicted,
                 sums: &mut sums,
                 prescribed: [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1],
-                streamed: if self.non_temporal { n } else { 0 },
+                streamed,
             };
             along_row::<V>(n, &mut work);
             if !self.periodic[0] {
@@ -186,8 +185,8 @@ struct PredictRow<'a, R> {
     sums: &'a mut [Partial; 3],
     /// Components whose faces on the whole row have a prescribed velocity.
     prescribed: [bool; 3],
-    /// Entries of the row if written with non-temporal stores, else 0.
-    streamed: usize,
+    /// Entries of the row that are written with non-temporal stores.
+    streamed: Range<usize>,
 }
 
 impl<R: Real> RowWork for PredictRow<'_, R> {
@@ -235,7 +234,7 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         let lower = [left(p), here(pm), here(pb)];
         let (now, before) = (V::constant(self.weights.now), V::constant(self.weights.before));
         // Boundary conditions read the ends of a row, which therefore stay in the cache.
-        let streamed = inside_row(i, V::WIDTH, self.streamed);
+        let streamed = self.streamed.contains(&i);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
             let pressure = V::constant(self.weights.dt_per_h[axis]) * (pc - lower[axis]);

@@ -4,13 +4,15 @@
 //! Legend: u, v, w components along x, y, z; q any of them; f pressure increment over density;
 //! suffixes as in `prediction.rs`: l/r left and right in x, m/p down and up in y, b/t in z.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{
-    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inside_row, window, window_mut,
+    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inner_lines, window, window_mut,
 };
 
 /// Measures of the flow over the whole grid after a projection.
@@ -171,6 +173,8 @@ impl<R: Real> Kernel for Correct<'_, R> {
         let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
+            let out = [layout.row_of_mut(x, j), layout.row_of_mut(y, j), layout.row_of_mut(z, j)];
+            let streamed = if self.non_temporal { inner_lines::<V>(out[0], n) } else { 0..0 };
             let mut work = CorrectRow {
                 q: [layout.row_of(u, j), layout.row_of(v, j), layout.row_of(w, j)],
                 vp: layout.row_of(v, next(j, ny, periodic[1])),
@@ -180,9 +184,9 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
                 inverse: self.inverse,
                 dt_per_h: self.dt_per_h,
-                out: [layout.row_of_mut(x, j), layout.row_of_mut(y, j), layout.row_of_mut(z, j)],
+                out,
                 pressure: layout.row_of_mut(p, j),
-                streamed: if self.non_temporal { n } else { 0 },
+                streamed,
                 partial: &mut partial,
                 prescribed: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
             };
@@ -241,8 +245,8 @@ struct CorrectRow<'a, R> {
     dt_per_h: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
-    /// Entries of the row if written with non-temporal stores, else 0.
-    streamed: usize,
+    /// Entries of the row that are written with non-temporal stores.
+    streamed: Range<usize>,
     partial: &'a mut CorrectPartial<R>,
     /// Components whose faces on the whole row have a prescribed velocity.
     prescribed: [bool; 3],
@@ -262,7 +266,7 @@ impl<R: Real> CorrectRow<'_, R> {
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
-        let streamed = inside_row(i, V::WIDTH, self.streamed);
+        let streamed = self.streamed.contains(&i);
         for axis in 0..3 {
             let (dt_per_h, inverse) =
                 (V::constant(self.dt_per_h[axis]), V::constant(self.inverse[axis]));
