@@ -57,19 +57,11 @@ pub struct RigidBodySystem {
     right: Vector6,
     virtual_mass: VirtualMass,
     impulse: Impulse,
-    /// Terms of a part of the grain beyond a free surface.
-    surface: Option<SurfaceTerms>,
+    /// Of a part of the grain beyond a free surface: inertia of the fluid that the part does not
+    /// displace, and load of the pressure at the surface.
+    surface: Option<(Matrix6, Load)>,
     /// Load of a grain that leaves the box.
     last_load: Option<Load>,
-}
-
-/// Terms of a part of a grain beyond a free surface.
-#[derive(Clone, Copy, Debug)]
-struct SurfaceTerms {
-    /// Inertia of fluid that the part does not displace.
-    not_displaced: Matrix6,
-    /// Load of the pressure at the surface.
-    load: Load,
 }
 
 impl RigidBodySystem {
@@ -100,31 +92,29 @@ impl RigidBodySystem {
         surface: Option<(&EmergedPart, Load)>,
         dt: f64,
     ) -> RigidBodySystem {
-        let surface = surface.map(|(part, load)| SurfaceTerms {
-            not_displaced: part.inertia.map(|row| row.map(|entry| fluid_density * entry)),
-            load,
+        let surface = surface.map(|(part, load)| {
+            (part.inertia.map(|row| row.map(|entry| fluid_density * entry)), load)
         });
-        let applied = surface.map_or(applied, |terms| applied + terms.load);
+        let applied = surface.map_or(applied, |(_, load)| applied + load);
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);
         let RigidVelocity { linear: v, angular: omega } = previous.velocity;
         let gyroscopic = omega.cross(inertia * omega);
-        let momentum = mass * v + dt * applied.force;
-        let angular_momentum = inertia * omega + dt * (applied.torque - gyroscopic);
         let virtual_mass = VirtualMass::new(grain, previous, fluid_density, surface.is_some(), dt);
-        let mut a = impulse.matrix;
-        let mut b = [0.0; 6];
+        let linear = mass * v + dt * applied.force + virtual_mass.momentum[0];
+        let torque = applied.torque - gyroscopic;
+        let angular = inertia * omega + dt * torque + virtual_mass.momentum[1];
+        let (mut a, mut b) = (impulse.matrix, [0.0; 6]);
         for row in 0..3 {
             a[row][row] += mass + virtual_mass.mass;
-            b[row] = momentum[row] + virtual_mass.momentum[row] - impulse.constant[row];
-            b[3 + row] = angular_momentum[row] + virtual_mass.angular_momentum[row]
-                - impulse.constant[3 + row];
+            b[row] = linear[row] - impulse.constant[row];
+            b[3 + row] = angular[row] - impulse.constant[3 + row];
             for column in 0..3 {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        if let Some(SurfaceTerms { not_displaced, .. }) = surface {
+        if let Some((not_displaced, _)) = surface {
             let momentum = multiply6(&not_displaced, &previous.velocity.to_vector());
             for row in 0..6 {
                 b[row] += momentum[row];
@@ -133,11 +123,11 @@ impl RigidBodySystem {
                 }
             }
         }
-        if grain.translation != MotionConstraint::Free {
-            prescribe(&mut a, &mut b, 0, grain.velocity);
-        }
-        if grain.rotation != MotionConstraint::Free {
-            prescribe(&mut a, &mut b, 3, grain.angular_velocity);
+        let (free, prescribed) = (free(grain), grain.rigid_velocity().to_vector());
+        for row in (0..6).filter(|row| !free[row / 3]) {
+            a[row] = [0.0; 6];
+            a[row][row] = 1.0;
+            b[row] = prescribed[row];
         }
         RigidBodySystem { matrix: a, right: b, virtual_mass, impulse, surface, last_load: None }
     }
@@ -150,14 +140,10 @@ impl RigidBodySystem {
         contact: Load,
         dt: f64,
     ) -> RigidVelocity {
-        let mut right = self.right;
-        for axis in 0..3 {
-            if grain.translation == MotionConstraint::Free {
-                right[axis] += dt * contact.force[axis];
-            }
-            if grain.rotation == MotionConstraint::Free {
-                right[3 + axis] += dt * contact.torque[axis];
-            }
+        let (mut right, free) = (self.right, free(grain));
+        let load = [contact.force, contact.torque];
+        for row in (0..6).filter(|row| free[row / 3]) {
+            right[row] += dt * load[row / 3][row % 3];
         }
         // Singular only if no face is forced; such a grain keeps its velocities.
         let x = solve6(self.matrix, right);
@@ -178,13 +164,13 @@ impl RigidBodySystem {
         let new = grain.rigid_velocity();
         let mut j = self.impulse.at(new);
         let change = new - previous.velocity;
-        if let Some(SurfaceTerms { not_displaced, .. }) = &self.surface {
+        if let Some((not_displaced, _)) = &self.surface {
             let momentum = multiply6(not_displaced, &change.to_vector());
             j.iter_mut().zip(momentum).for_each(|(j, momentum)| *j += momentum);
         }
-        let VirtualMass { mass, inertia, momentum, angular_momentum } = self.virtual_mass;
-        let force = DVec3::from_slice(&j[..3]) + mass * new.linear - momentum;
-        let torque = DVec3::from_slice(&j[3..]) + inertia * new.angular - angular_momentum;
+        let VirtualMass { mass, inertia, momentum } = self.virtual_mass;
+        let force = DVec3::from_slice(&j[..3]) + mass * new.linear - momentum[0];
+        let torque = DVec3::from_slice(&j[3..]) + inertia * new.angular - momentum[1];
         let omega = previous.velocity.angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
@@ -193,7 +179,7 @@ impl RigidBodySystem {
             torque: (fluid_inertia * change.angular - torque) / dt
                 + omega.cross(fluid_inertia * omega),
         };
-        self.surface.map_or(load, |terms| load + terms.load)
+        self.surface.map_or(load, |(_, of_surface)| load + of_surface)
     }
 
     /// Impulse on the fluid [N s] of the grain, which has its new velocities.
@@ -216,33 +202,25 @@ impl RigidBodySystem {
         dt: f64,
     ) -> GrainResponse {
         let start = previous.velocity - previous.pending_added_mass_velocity;
-        let x = start.to_vector();
+        let free = free(grain);
         // Load that changes the initial velocities over dt, with the matrix before mass is added.
-        let mut drive: Vector6 = std::array::from_fn(|row| {
-            let momentum: f64 = (0..6).map(|n| self.matrix[row][n] * x[n]).sum();
-            (self.right[row] - momentum) / dt
+        let momentum = multiply6(&self.matrix, &start.to_vector());
+        let drive: Vector6 = std::array::from_fn(|row| {
+            if free[row / 3] { (self.right[row] - momentum[row]) / dt } else { 0.0 }
         });
         let mut a = self.matrix;
         let least_mass = grain.mass() + added_density * grain.shape.volume();
         let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
-        let free = [grain.translation, grain.rotation]
-            .map(|constraint| constraint == MotionConstraint::Free);
         if free[0] {
-            for (axis, row) in a.iter_mut().take(3).enumerate() {
-                row[axis] += (least_mass - mean_mass).max(0.0);
+            for axis in 0..3 {
+                a[axis][axis] += (least_mass - mean_mass).max(0.0);
             }
         }
-        let column = |n: usize| {
+        let columns: [Vector6; 6] = std::array::from_fn(|n| {
             let mut unit = [0.0; 6];
             unit[n] = if free[n / 3] { 1.0 } else { 0.0 };
             solve6(a, unit).unwrap_or([0.0; 6])
-        };
-        let columns: [Vector6; 6] = std::array::from_fn(column);
-        for (n, free) in free.into_iter().enumerate() {
-            if !free {
-                drive[3 * n..3 * n + 3].fill(0.0);
-            }
-        }
+        });
         let response = GrainResponse::new(start, drive, columns);
         if previous.has_pending_velocity() {
             response.after_contact(self.velocities(grain, previous, Load::default(), dt))
@@ -252,13 +230,9 @@ impl RigidBodySystem {
     }
 }
 
-/// Replaces three equations by prescribed velocities.
-fn prescribe(a: &mut Matrix6, b: &mut Vector6, first: usize, velocity: DVec3) {
-    for i in 0..3 {
-        a[first + i] = [0.0; 6];
-        a[first + i][first + i] = 1.0;
-        b[first + i] = velocity[i];
-    }
+/// Whether the translation and the rotation of a grain follow the equations of motion.
+fn free(grain: &Grain) -> [bool; 2] {
+    [grain.translation, grain.rotation].map(|constraint| constraint == MotionConstraint::Free)
 }
 
 /// Inertia of the fluid that a light grain accelerates with itself.
@@ -268,10 +242,8 @@ struct VirtualMass {
     mass: f64,
     /// Virtual inertia about the centroid, space frame [kg m^2].
     inertia: DMat3,
-    /// Momentum of the virtual mass after a step with the previous acceleration [kg m/s].
-    momentum: DVec3,
-    /// Angular momentum of the virtual inertia after such a step [kg m^2/s].
-    angular_momentum: DVec3,
+    /// Linear and angular momentum after a step with the previous acceleration [kg m/s, kg m^2/s].
+    momentum: [DVec3; 2],
 }
 
 /// Density ratio below which the virtual mass is the displaced mass. Above it the virtual mass
@@ -293,17 +265,13 @@ impl VirtualMass {
         let part = if in_free_surface { 1.0 } else { part };
         // Virtual mass over the mass of the grain.
         let part = part / density_ratio;
-        let free = |constraint: MotionConstraint| {
-            if constraint == MotionConstraint::Free { part } else { 0.0 }
-        };
-        let mass = grain.mass() * free(grain.translation);
-        let inertia = grain.inertia() * free(grain.rotation);
+        let [translation, rotation] = free(grain).map(|free| if free { part } else { 0.0 });
+        let (mass, inertia) = (grain.mass() * translation, grain.inertia() * rotation);
         let PreviousStep { velocity, acceleration, .. } = previous;
-        VirtualMass {
-            mass,
-            inertia,
-            momentum: mass * (velocity.linear + dt * acceleration.linear),
-            angular_momentum: inertia * (velocity.angular + dt * acceleration.angular),
-        }
+        let momentum = [
+            mass * (velocity.linear + dt * acceleration.linear),
+            inertia * (velocity.angular + dt * acceleration.angular),
+        ];
+        VirtualMass { mass, inertia, momentum }
     }
 }
