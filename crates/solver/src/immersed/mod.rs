@@ -1,26 +1,8 @@
 //! Coupling of flow and grains: the grid takes the rigid velocities, the grains take their loads
 //! (Eq. 5).
 //!
-//! # Layers
-//!
-//! Each layer imports only from the layers above it in this table.
-//!
-//! | layer | task | data it makes |
-//! |---|---|---|
-//! | `geometry` | distances to faces, index lists, neighbours | `LocatedBody`, `BandFaces` |
-//! | `forcing`, `shared_faces` | weights of faces, next to one and several grains | `ForcedFaces` |
-//! | `rigidity` | impulse, rigid velocity | `Impulse` |
-//! | `links`, `advection` | correction at the links near a grain | `AdvectionCorrection` |
-//! | `emerged` | part of a grain beyond a free surface | `EmergedPart` |
-//! | `rigid_body` | 6 x 6 equations of motion with the impulse | `RigidBodySystem` |
-//! | `open_sides` | grains that leave the box or float | `Crossing` |
-//! | `update`, `schedule` | work on one grain; order of the grains | `CoupledGrains` |
-//! | `initial` | flow at t = 0 | |
-//!
-//! # Order in a step
-//!
-//! `ImmersedGrains::couple` and `ImmersedGrains::impose_rigidity` in `schedule.rs` do for each
-//! grain:
+//! `ImmersedGrains::couple` and `ImmersedGrains::impose_rigidity` in `schedule.rs` do in a step for
+//! each grain:
 //!
 //! 1. `advection.rs` corrects the prediction u* next to the last pose of the grain.
 //! 2. `geometry/mod.rs` lists the faces near the new pose. `geometry/distances.rs` evaluates their
@@ -37,7 +19,9 @@
 //! film loads a grain, the caller (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5,
 //! with `CoupledGrains::responses`.
 //!
-//! Every kernel has a plain scalar form in `reference/`, against which it is tested.
+//! `update.rs` does the work on one grain. `open_sides.rs` and `emerged.rs` treat grains that leave
+//! the box or float in a free surface, `initial.rs` sets the flow at t = 0. Every kernel has a plain
+//! scalar form in `reference/`, against which it is tested.
 
 mod advection;
 mod emerged;
@@ -116,7 +100,7 @@ impl<R: Real> ImmersedGrains<R> {
             fluid_density,
             locator: Locator::new(flow.mesh(), flow.boundaries(), grains),
             grains: grains.iter().map(|_| ImmersedGrain::default()).collect(),
-            scratch: ScratchPool::default(),
+            scratch: ScratchPool::new(),
             updates: Vec::with_capacity(grains.len()),
             access: AccessLog::default(),
             mesh: *flow.mesh(),
@@ -136,15 +120,9 @@ impl<R: Real> ImmersedGrains<R> {
 
     /// Lists the faces near the grains at their present poses.
     pub fn locate(&mut self, grains: &[Grain]) {
-        self.locate_with_forcing(grains, 1.0);
-        self.release_forcing();
-    }
-
-    /// Lists the faces near the grains and computes the weights of the forced faces for a step of
-    /// `dt` [s].
-    fn locate_with_forcing(&mut self, grains: &[Grain], dt: f64) {
         self.locator.find_neighbours(grains, |_| 0.0);
-        let params = self.forcing_params(dt);
+        // The weights of the forced faces, which depend on the length of the step, are not used.
+        let params = self.forcing_params(1.0);
         let (locator, scratch) = (&self.locator, &self.scratch);
         let each = self.grains.par_iter_mut().enumerate();
         each.for_each(|(index, ImmersedGrain { body, forced, located_for, .. })| {
@@ -152,6 +130,7 @@ impl<R: Real> ImmersedGrains<R> {
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
             locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
         });
+        self.release_forcing();
     }
 
     /// Releases the lists of forced faces, which isolated grains do not need.

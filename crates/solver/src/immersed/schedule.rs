@@ -94,8 +94,7 @@ impl<R: Real> ImmersedGrains<R> {
         input: CouplingInput,
         mut updates: Vec<GrainUpdate>,
     ) -> CoupledGrains {
-        let corrects_advection = self.scheme == Scheme::Aperture;
-        if corrects_advection && updates.iter().any(|update| !update.isolated) {
+        if self.scheme == Scheme::Aperture && updates.iter().any(|update| !update.isolated) {
             self.correct_advection(flow, &input, &updates);
         }
         let (known, predictions) = flow.prediction();
@@ -104,7 +103,6 @@ impl<R: Real> ImmersedGrains<R> {
             params: self.forcing_params(input.dt),
             input,
             known,
-            corrects_advection,
             fluid_density: self.fluid_density,
             kinematic_viscosity: self.kinematic_viscosity,
         };

@@ -2,9 +2,9 @@
 //! motion of any other. Buffers of the threads, and in debug builds a log of the faces that they
 //! use.
 
-use std::ops::{Deref, DerefMut};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use super::Scheme;
 use super::advection::{AdvectionCorrection, AdvectionScratch, add_correction, find_correction};
 use super::forcing::{ForcedFaces, ForcingParams};
 use super::geometry::{LocateScratch, LocatedBody, Locator, NeighbourGrain};
@@ -138,8 +138,6 @@ pub struct CouplingContext<'a, R> {
     pub input: CouplingInput<'a>,
     /// Fields of the last step.
     pub known: OldState<'a, R>,
-    /// Whether the advection next to the grains is corrected: in the aperture scheme.
-    pub corrects_advection: bool,
     /// Density of the fluid [kg/m^3].
     pub fluid_density: f64,
     /// Kinematic viscosity of the fluid [m^2/s].
@@ -160,7 +158,7 @@ impl<R: Real> CouplingContext<'_, R> {
         let ThreadScratch { advection, locate, correction, forced } = scratch;
         grain.located_for = None;
         let body = &mut grain.body;
-        if self.corrects_advection {
+        if self.params.scheme == Scheme::Aperture {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
             let (nu, known) = (self.kinematic_viscosity, &self.known);
             find_correction(eps, nu, known, kinematics, body, advection, correction);
@@ -259,92 +257,33 @@ pub fn locate_and_compute_weights(
     share_faces(params, &scratch.band, locator.neighbours(index), locator.shapes(), forced);
 }
 
-/// Pool of idle buffers, kept from one step to the next. It grows to the largest number of threads
-/// that have worked at once.
-#[derive(Default)]
-pub struct ScratchPool<T>(Mutex<Vec<T>>);
+/// Buffers of the threads, kept from one step to the next.
+pub struct ScratchPool<T>(Vec<Mutex<T>>);
 
 impl<T: Default> ScratchPool<T> {
-    /// Borrows an idle buffer, or a new one if there is none.
-    pub fn borrow(&self) -> Scratch<'_, T> {
-        let buffer = self.0.lock().expect("no thread panicked").pop();
-        Scratch { pool: self, buffer: buffer.unwrap_or_default() }
+    /// Buffers for the threads of the present pool.
+    pub fn new() -> ScratchPool<T> {
+        ScratchPool((0..rayon::current_num_threads()).map(|_| Mutex::default()).collect())
+    }
+
+    /// Borrows the buffer of this thread. Threads of a larger pool share buffers.
+    pub fn borrow(&self) -> MutexGuard<'_, T> {
+        let thread = rayon::current_thread_index().unwrap_or(0);
+        // A buffer holds nothing from one grain to the next that a panic could damage.
+        self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A borrowed buffer, returned to the pool when dropped.
-pub struct Scratch<'a, T: Default> {
-    pool: &'a ScratchPool<T>,
-    buffer: T,
-}
-
-impl<T: Default> Deref for Scratch<'_, T> {
-    type Target = T;
-    fn deref(&self) -> &T {
-        &self.buffer
-    }
-}
-impl<T: Default> DerefMut for Scratch<'_, T> {
-    fn deref_mut(&mut self) -> &mut T {
-        &mut self.buffer
-    }
-}
-impl<T: Default> Drop for Scratch<'_, T> {
-    fn drop(&mut self) {
-        if let Ok(mut buffers) = self.pool.0.lock() {
-            buffers.push(std::mem::take(&mut self.buffer));
-        }
-    }
-}
-
-/// Faces of the prediction that the grains have borrowed in a step, to assert that no thread writes
+/// Rows of the prediction that the grains have borrowed in a step, to assert that no thread writes
 /// a face that another one uses; empty in release builds.
 #[derive(Default)]
-pub struct AccessLog(Mutex<Vec<Entry>>);
-
-/// Adjacent faces that one grain has borrowed.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct Entry {
-    start: usize,
-    end: usize,
-    grain: usize,
-    writes: bool,
-}
-
-/// Ends of the entries so far, the furthest of all and the furthest of another grain.
-#[derive(Clone, Copy, Default)]
-struct Furthest([(usize, usize); 2]);
-
-impl Furthest {
-    /// Adds an entry of a grain.
-    fn add(&mut self, grain: usize, end: usize) {
-        let [first, second] = &mut self.0;
-        if first.0 == grain {
-            first.1 = first.1.max(end);
-        } else if first.1 < end {
-            (*second, *first) = (*first, (grain, end));
-        } else if second.1 < end {
-            *second = (grain, end);
-        }
-    }
-
-    /// Returns the grain other than `grain` whose entries end last, if they end behind `start`.
-    fn beyond(&self, grain: usize, start: usize) -> Option<usize> {
-        let other = self.0.iter().find(|one| one.0 != grain && one.1 > start);
-        other.map(|one| one.0)
-    }
-}
+pub struct AccessLog(Mutex<Vec<(usize, BorrowedRow)>>);
 
 impl AccessLog {
-    /// Records the faces that a grain has borrowed.
+    /// Records the rows that a grain has borrowed.
     pub fn record(&self, grain: usize, rows: Vec<BorrowedRow>) {
         if !rows.is_empty() {
-            let entries = rows.into_iter().map(|BorrowedRow { addresses, mutable }| Entry {
-                start: addresses.start,
-                end: addresses.end,
-                grain,
-                writes: mutable,
-            });
+            let entries = rows.into_iter().map(|row| (grain, row));
             self.0.lock().expect("no thread panicked").extend(entries);
         }
     }
@@ -352,17 +291,18 @@ impl AccessLog {
     /// Panics if one grain writes a face that another one uses; clears the log.
     pub fn assert_no_conflict(&mut self) {
         let entries = self.0.get_mut().expect("no thread panicked");
-        entries.sort_unstable();
-        let (mut all, mut written) = (Furthest::default(), Furthest::default());
-        for Entry { start, end, grain, writes } in entries.drain(..) {
-            let before = if writes { &all } else { &written };
-            if let Some(other) = before.beyond(grain, start) {
+        entries.sort_unstable_by_key(|(grain, row)| (row.addresses.start, *grain));
+        // Earlier rows that contain the start of the present one.
+        let mut open: Vec<(usize, BorrowedRow)> = Vec::new();
+        for (grain, row) in entries.drain(..) {
+            open.retain(|(_, earlier)| earlier.addresses.end > row.addresses.start);
+            let conflict = open
+                .iter()
+                .find(|(other, earlier)| *other != grain && (earlier.mutable || row.mutable));
+            if let Some((other, _)) = conflict {
                 panic!("grains {other} and {grain} use the same faces at once");
             }
-            all.add(grain, end);
-            if writes {
-                written.add(grain, end);
-            }
+            open.push((grain, row));
         }
     }
 }
