@@ -64,9 +64,9 @@ pub fn sum_impulse<R: Real>(
     dispatch(SumImpulse { known, predictions, forced, old, acceleration, dt, sums: &mut sums });
     let w = fluid_density * known.mesh.cell_volume();
     let mut impulse = Impulse::default();
-    for (axis, sum) in sums.iter().enumerate() {
-        let constant = sum.constant.map(|s| s.sum());
-        let matrix = sum.matrix.map(|s| s.sum());
+    for (axis, moments) in sums.iter().enumerate() {
+        let moments = moments.map(|sum| sum.sum());
+        let (constant, matrix) = moments.split_at(3);
         // A force along the axis has no torque about it.
         let rows = [axis, 3 + (axis + 1) % 3, 3 + (axis + 2) % 3];
         for (a, row) in rows.into_iter().enumerate() {
@@ -79,38 +79,9 @@ pub fn sum_impulse<R: Real>(
     impulse
 }
 
-/// Moments of the gain of one component: its part at U = 0 and its derivative dGain / dU.
-#[derive(Clone, Copy, Default)]
-struct Moments {
-    /// Sums of the part at U = 0 times 1, l and m.
-    constant: [Partial; 3],
-    /// Sums of the derivative times 1, l, m, l l, l m and m m.
-    matrix: [Partial; 6],
-}
-
-impl Moments {
-    /// Adds the faces from face `n` of a run on, at `lever_arm` [m] from the centroid.
-    #[inline(always)]
-    fn add<V: Vector<Number = f64>>(
-        &mut self,
-        axis: usize,
-        n: usize,
-        lever_arm: [V; 3],
-        constant: V,
-        derivative: V,
-    ) {
-        let (l, m) = (lever_arm[(axis + 2) % 3], V::constant(0.0) - lever_arm[(axis + 1) % 3]);
-        let [by_l, by_m] = [derivative * l, derivative * m];
-        let constants = [constant, constant * l, constant * m];
-        let derivatives = [derivative, by_l, by_m, by_l * l, by_l * m, by_m * m];
-        for (sum, value) in self.constant.iter_mut().zip(&constants) {
-            sum.add(n + 1, *value);
-        }
-        for (sum, value) in self.matrix.iter_mut().zip(&derivatives) {
-            sum.add(n + 1, *value);
-        }
-    }
-}
+/// Moments of the gain of one component: sums of its part at U = 0 times 1, l and m, then of its
+/// derivative dGain / dU times 1, l, m, l l, l m and m m.
+type Moments = [Partial; 9];
 
 struct SumImpulse<'a, R> {
     known: &'a OldState<'a, R>,
@@ -126,11 +97,9 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let mesh = self.known.mesh;
-        let forced = self.forced;
+        let (mesh, spacing, forced) = (self.known.mesh, self.known.mesh.spacing, self.forced);
         let mut rest_gain = std::mem::take(&mut forced.rest_gain);
         rest_gain.resize(forced.weight.len(), 0.0);
-        let spacing = mesh.spacing;
         let [x, y, z] = mesh.layout().strides().map(|stride| stride as isize);
         let stencil = Stencil::new([0, x, -x, y, -y, z, -z]);
         let total_closed_fraction = forced.total_closed_fraction();
@@ -139,7 +108,7 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
             let above = self.old.angular.cross(half_cell);
             for run in runs {
                 let rigid = RigidRun::new(self.old, run.lever_arm, spacing);
-                let acceleration = RigidRun::new(self.acceleration, run.lever_arm, spacing);
+                let shifted = |offset| RigidRun { first: rigid.first + offset, ..rigid };
                 let faces = RunImpulse {
                     axis,
                     run,
@@ -147,9 +116,9 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     pressure: self.known.pressure,
                     stencil,
                     rigid,
-                    acceleration,
+                    acceleration: RigidRun::new(self.acceleration, run.lever_arm, spacing),
                     dt: self.dt,
-                    cells: [above, -above].map(|offset| rigid.shifted(offset)),
+                    cells: [above, -above].map(shifted),
                     dt_per_2h: (0.5 * self.dt / spacing).to_array(),
                     dt_per_h: self.dt / spacing[axis],
                     dt_g: self.dt * self.known.body_acceleration[axis],
@@ -244,7 +213,14 @@ impl<R: Real> RunImpulse<'_, R> {
         let end = V::constant(self.run.count as f64);
         let constant = index.select_below(end, constant, zero);
         let derivative = index.select_below(end, derivative, zero);
-        sums.add(self.axis, n, lever_arm, constant, derivative);
+        let (l, m) = (lever_arm[(self.axis + 2) % 3], zero - lever_arm[(self.axis + 1) % 3]);
+        let [by_l, by_m] = [derivative * l, derivative * m];
+        let [constant_l, constant_m] = [constant * l, constant * m];
+        let [l_l, l_m, m_m] = [by_l * l, by_l * m, by_m * m];
+        let moments = [constant, constant_l, constant_m, derivative, by_l, by_m, l_l, l_m, m_m];
+        for (sum, value) in sums.iter_mut().zip(&moments) {
+            sum.add(n + 1, *value);
+        }
         rest_gain
     }
 }
@@ -314,11 +290,6 @@ impl RigidRun {
             first: velocity.at(lever_arm),
             change: velocity.angular.cross(DVec3::X * spacing.x),
         }
-    }
-    /// Velocity along a parallel line, on which the velocity differs by `offset` [m/s].
-    #[inline(always)]
-    fn shifted(self, offset: DVec3) -> RigidRun {
-        RigidRun { first: self.first + offset, ..self }
     }
     /// Component `axis` of the velocity at the faces `index` of the run [m/s].
     #[inline(always)]
