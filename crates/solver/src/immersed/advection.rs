@@ -65,16 +65,19 @@ pub fn find_correction<R: Real>(
     scratch: &mut AdvectionScratch<R>,
     correction: &mut AdvectionCorrection,
 ) {
-    dispatch(FindCorrection {
-        eps,
-        kinematic_viscosity,
-        mesh: known.mesh,
-        kinematics,
-        body,
-        velocity: BoxVelocity::new(known, body, &mut scratch.copies),
-        planes: &mut scratch.planes,
-        correction,
-    });
+    let velocity = BoxVelocity::new(known, body, &mut scratch.copies);
+    for (component, correction) in correction.iter_mut().enumerate() {
+        correction.resize(body.distance[component].len(), 0.0);
+        let links = ComponentLinks::new(
+            [eps, kinematic_viscosity],
+            known.mesh,
+            kinematics,
+            body,
+            &velocity,
+            component,
+        );
+        dispatch(CorrectComponent { links, planes: &mut scratch.planes, correction });
+    }
 }
 
 /// Adds a component of the correction to a part of the prediction.
@@ -84,11 +87,8 @@ pub fn add_correction<R: Real>(
     component: usize,
     prediction: &mut Prediction<R>,
 ) {
-    dispatch(AddCorrection {
-        rows: &body.rows[component],
-        correction: &correction[component],
-        prediction,
-    });
+    let (rows, correction) = (&body.rows[component][..], &correction[component][..]);
+    dispatch(AddCorrection { rows, correction, prediction });
 }
 
 struct AddCorrection<'a, 'b, R> {
@@ -109,33 +109,32 @@ impl<R: Real> Kernel for AddCorrection<'_, '_, R> {
     }
 }
 
-struct FindCorrection<'a, R> {
-    eps: f64,
-    kinematic_viscosity: f64,
-    mesh: &'a Mesh,
-    kinematics: &'a GrainKinematics,
-    body: &'a LocatedBody,
-    velocity: BoxVelocity<'a, R>,
+/// Writes the correction of all faces of one component.
+struct CorrectComponent<'a, R> {
+    links: ComponentLinks<'a, R>,
     planes: &'a mut LinkPlanes,
-    correction: &'a mut AdvectionCorrection,
+    correction: &'a mut [f64],
 }
 
-impl<R: Real> Kernel for FindCorrection<'_, R> {
+impl<R: Real> Kernel for CorrectComponent<'_, R> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let FindCorrection { eps, mesh, kinematics, body, velocity, planes, correction, .. } = self;
-        let nu = self.kinematic_viscosity;
-        for (component, correction) in correction.iter_mut().enumerate() {
-            correction.resize(body.distance[component].len(), 0.0);
-            ComponentLinks::new([eps, nu], mesh, kinematics, body, &velocity, component)
-                .correct::<V>(planes, correction);
+        let CorrectComponent { links, planes, correction } = self;
+        let ComponentLinks { body, component, eps, ref unknowns, .. } = links;
+        planes.reset(body);
+        for k in -1..body.size.z {
+            compute_link_weights(unknowns, body, component, eps, k, planes);
+            let rows = if k < 0 { 0 } else { body.size.y };
+            for j in 0..rows {
+                links.correct_row::<V>([j, k], planes, correction);
+            }
         }
     }
 }
 
 /// Links of one component.
-pub struct ComponentLinks<'a, R> {
+struct ComponentLinks<'a, R> {
     body: &'a LocatedBody,
     velocity: &'a BoxVelocity<'a, R>,
     component: usize,
@@ -163,18 +162,8 @@ struct LinkAxis {
     largest_excess: f64,
 }
 
-/// Links of a row along one axis that get the sixth-order mean.
-#[derive(Clone, Copy)]
-struct SixthOrderLinks<'a> {
-    /// First index along x, and the index after the last.
-    start: f64,
-    end: f64,
-    /// Faces to load for all links of the row.
-    advected: &'a Stencil<6>,
-}
-
 impl<'a, R: Real> ComponentLinks<'a, R> {
-    pub fn new(
+    fn new(
         [eps, nu]: [f64; 2],
         mesh: &Mesh,
         kinematics: &GrainKinematics,
@@ -207,26 +196,6 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Writes the correction of all faces of the component.
-    #[inline(always)]
-    pub fn correct<V: Vector<Number = f64>>(
-        &self,
-        planes: &mut LinkPlanes,
-        correction: &mut [f64],
-    ) {
-        planes.reset(self.body);
-        let compute_weights = |k, planes: &mut LinkPlanes| {
-            compute_link_weights(&self.unknowns, self.body, self.component, self.eps, k, planes);
-        };
-        compute_weights(-1, planes);
-        for k in 0..self.body.size.z {
-            compute_weights(k, planes);
-            for j in 0..self.body.size.y {
-                self.correct_row::<V>([j, k], planes, correction);
-            }
-        }
-    }
-
     /// Computes the fluxes of the links whose lower faces are in row (j, k). Writes the correction
     /// of these faces: fluxes in, from the previous row and plane, less fluxes out.
     #[inline(always)]
@@ -236,7 +205,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         planes: &mut LinkPlanes,
         correction: &mut [f64],
     ) {
-        let Some(listed) = listed_faces(self.body, &self.unknowns, self.component, [j, k]) else {
+        let listed = listed_faces(self.body, &self.unknowns, self.component, [j, k]);
+        let Some((listed, first_listed)) = listed else {
             return;
         };
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
@@ -244,11 +214,9 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let index = [0, j, k];
         let sixth_order = [0, 1, 2].map(|along| self.sixth_order_links(along, index));
         let rigid = self.rigid.first_of_row([j, k]);
-        let LinkPlanes { row_length, weight, flux_y, flux_z, .. } = planes;
-        let row_length = *row_length;
-        let [wx, wy, wz] = weight;
-        let (wx, wy, wz) =
-            (&wx[first..][..row_length], &wy[first..][..row_length], &wz[first..][..row_length]);
+        let row_length = planes.row_length;
+        let LinkPlanes { weight, flux_y, flux_z, .. } = planes;
+        let [wx, wy, wz] = weight.each_ref().map(|weight| &weight[first..][..row_length]);
         let (fy, fz) = (&mut flux_y[..row_length], &mut flux_z[first..][..row_length]);
         let zero = V::constant(0.0);
         let (mut n, mut last_flux, mut index) = (0, zero, V::ramp());
@@ -276,7 +244,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             // Lanes whose faces are listed.
             let (start, end) = (listed.start.max(n), listed.end.min(n + V::WIDTH));
             if start < end {
-                let entry = listed.first + (start - listed.start);
+                let entry = first_listed + (start - listed.start);
                 sum.store_from(start - n, &mut correction[entry..entry + (end - start)]);
             }
             n += V::WIDTH;
@@ -284,18 +252,18 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Returns the links along an axis of the row with `index` that have six faces in line.
-    fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> SixthOrderLinks<'_> {
+    /// Faces to load for the links along an axis of the row with `index`. Also the first index along
+    /// x of the links that have six faces in line, and the index after the last.
+    fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
         let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
-        let (start, end) = (range.start + 2 - index, range.end - 3 - index);
-        let (start, end, advected) = if along == 0 {
-            (f64::from(start), f64::from(end), &axis.six_faces)
+        let [start, end] = [range.start + 2 - index, range.end - 3 - index];
+        if along == 0 {
+            (&axis.six_faces, [start, end].map(f64::from))
         } else if start <= 0 && 0 < end {
-            (f64::NEG_INFINITY, f64::INFINITY, &axis.six_faces)
+            (&axis.six_faces, [f64::NEG_INFINITY, f64::INFINITY])
         } else {
-            (0.0, 0.0, &axis.two_faces)
-        };
-        SixthOrderLinks { start, end, advected }
+            (&axis.two_faces, [0.0; 2])
+        }
     }
 
     /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is
@@ -305,7 +273,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
     fn flux<V: Vector<Number = f64>>(
         &self,
         along: usize,
-        sixth_order: SixthOrderLinks,
+        (advected, [start, end]): (&Stencil<6>, [f64; 2]),
         [u_q, u_c]: [f64; 2],
         at: usize,
         index: V,
@@ -319,8 +287,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
         let axis = &self.axes[along];
         let [q, c] = [self.component, along].map(|of| self.velocity.components[of]);
-        let [q_0, q_1, below, above, far_below, far_above] =
-            sixth_order.advected.load::<V, R>(q, at);
+        let [q_0, q_1, below, above, far_below, far_above] = advected.load::<V, R>(q, at);
         let [c_0, c_1] = axis.advecting.load::<V, R>(c, at);
         let both = q_0 + q_1;
         let (q_mean, c_mean) = (half * both, half * (c_0 + c_1));
@@ -328,8 +295,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let sixth = both.mul_add(V::constant(7.0), outer);
         let higher_order = c_mean * V::constant(1.0 / 60.0) * sixth;
         // Values read beyond the ends of the grid are arbitrary.
-        let higher_order = index.select_below(V::constant(sixth_order.end), higher_order, zero);
-        let higher_order = index.select_below(V::constant(sixth_order.start), zero, higher_order);
+        let higher_order = index.select_below(V::constant(end), higher_order, zero);
+        let higher_order = index.select_below(V::constant(start), zero, higher_order);
         let mut flux = higher_order;
         // Links outside the band are open: 1/A - 1 is zero.
         if zero.mask_below(weight) != 0 {

@@ -59,30 +59,22 @@ impl LinkPlanes {
     }
 }
 
-/// Unknown faces of a row within reach of the grain.
-pub struct ListedFaces {
-    /// First index along x, and the index after the last.
-    pub start: usize,
-    pub end: usize,
-    /// Entry of the first in [`LocatedBody::distance`].
-    pub first: usize,
-}
-
-/// Returns the unknown faces of row (j, k) within reach, if any; `x`, `y` and `z` are the indices
-/// of the unknowns along each axis.
+/// Returns the indices along x of the unknown faces of row (j, k) within reach of the grain, if
+/// any, and the entry of the first in [`LocatedBody::distance`]; `x`, `y` and `z` are the indices of
+/// the unknowns along each axis.
 #[inline(always)]
 pub fn listed_faces(
     body: &LocatedBody,
     [x, y, z]: &[Range<i32>; 3],
     component: usize,
     [j, k]: [i32; 2],
-) -> Option<ListedFaces> {
+) -> Option<(Range<usize>, usize)> {
     let span = &body.spans[component][(j + body.size.y * k) as usize];
     let (start, end) = (span.start.max(x.start), span.end.min(x.end));
     if start >= end || j < y.start || j >= y.end || k < z.start || k >= z.end {
         return None;
     }
-    Some(ListedFaces { start: start as usize, end: end as usize, first: span.entry(start) })
+    Some((start as usize..end as usize, span.entry(start)))
 }
 
 /// Computes the weights of the links whose lower faces are in plane `k`. Must be called for the
@@ -112,7 +104,7 @@ impl Kernel for ComputeLinkWeights<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(mut self) {
-        self.read_next_plane::<V>();
+        self.read_next_plane();
         if self.k >= 0 {
             self.compute_weights::<V>();
         }
@@ -122,29 +114,19 @@ impl Kernel for ComputeLinkWeights<'_> {
 impl ComputeLinkWeights<'_> {
     /// Copies the distances of the plane above from the list.
     #[inline(always)]
-    fn read_next_plane<V: Vector<Number = f32>>(&mut self) {
+    fn read_next_plane(&mut self) {
         let (body, k) = (self.body, self.k + 1);
         let row_length = self.planes.row_length;
         let length = row_length * (body.size.y as usize + 2) + MAX_LANES;
         let distance = &mut self.planes.distance[(k % 2) as usize][..length];
-        let infinity = V::constant(f64::INFINITY);
-        for n in (0..length).step_by(V::WIDTH) {
-            infinity.store(&mut distance[n..]);
-        }
+        distance.fill(f32::INFINITY);
         let list = &body.distance[self.component][..];
         let rows = if k < body.size.z { body.size.y } else { 0 };
         for j in 0..rows {
-            let Some(listed) = listed_faces(body, self.unknowns, self.component, [j, k]) else {
-                continue;
-            };
-            let count = listed.end - listed.start;
-            let first = (j + 1) as usize * row_length + listed.start;
-            for n in (0..count).step_by(V::WIDTH) {
-                // Entries beyond the row are overwritten by the next row.
-                let end = V::constant((count - n) as f64);
-                let d = V::load(&list[listed.first + n..]);
-                let d = V::ramp().select_below(end, d, infinity);
-                d.store(&mut distance[first + n..]);
+            let listed = listed_faces(body, self.unknowns, self.component, [j, k]);
+            if let Some((listed, first)) = listed {
+                let row = &mut distance[(j + 1) as usize * row_length..];
+                row[listed.clone()].copy_from_slice(&list[first..][..listed.len()]);
             }
         }
     }
@@ -155,8 +137,7 @@ impl ComputeLinkWeights<'_> {
         let LinkPlanes { row_length, distance, weight, .. } = &mut *self.planes;
         let [this, next] = [self.k, self.k + 1].map(|k| (k % 2) as usize);
         let (this, above) = (&distance[this][..], &distance[next][..]);
-        let [x, y, z] = weight;
-        let weight = [&mut x[..], &mut y[..], &mut z[..]];
+        let weight = weight.each_mut().map(|weight| &mut weight[..]);
         let (half, zero, no_link) = (V::constant(0.5), V::constant(0.0), V::constant(NO_LINK));
         let limits = [-self.eps, self.eps, forcing_reach(self.eps)];
         let [inside, band, outside] = limits.map(V::constant);
