@@ -65,17 +65,11 @@ pub fn find_correction<R: Real>(
     scratch: &mut AdvectionScratch<R>,
     correction: &mut AdvectionCorrection,
 ) {
+    let (mesh, parameters) = (known.mesh, [eps, kinematic_viscosity]);
     let velocity = BoxVelocity::new(known, body, &mut scratch.copies);
     for (component, correction) in correction.iter_mut().enumerate() {
         correction.resize(body.distance[component].len(), 0.0);
-        let links = ComponentLinks::new(
-            [eps, kinematic_viscosity],
-            known.mesh,
-            kinematics,
-            body,
-            &velocity,
-            component,
-        );
+        let links = ComponentLinks::new(parameters, mesh, kinematics, body, &velocity, component);
         dispatch(CorrectComponent { links, planes: &mut scratch.planes, correction });
     }
 }
@@ -212,7 +206,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
         let [a, b, c] = &self.axes;
         let index = [0, j, k];
-        let sixth_order = [0, 1, 2].map(|along| self.sixth_order_links(along, index));
+        let six = [0, 1, 2].map(|along| self.six_faces_in_line(along, index));
         let rigid = self.rigid.first_of_row([j, k]);
         let row_length = planes.row_length;
         let LinkPlanes { weight, flux_y, flux_z, .. } = planes;
@@ -224,20 +218,17 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             let at = at.wrapping_add(n);
             let mut sum = zero;
             if a.exists {
-                let weight = V::load_from(&wx[n..]);
-                let flux = self.flux::<V>(0, sixth_order[0], rigid[0], at, index, weight);
+                let flux = self.flux::<V>(0, six[0], rigid[0], at, index, &wx[n..]);
                 sum = flux.shift(last_flux) - flux;
                 last_flux = flux;
             }
             if b.exists {
-                let weight = V::load_from(&wy[n..]);
-                let flux = self.flux::<V>(1, sixth_order[1], rigid[1], at, index, weight);
+                let flux = self.flux::<V>(1, six[1], rigid[1], at, index, &wy[n..]);
                 sum = sum + (V::load(&fy[n..]) - flux);
                 flux.store(&mut fy[n..]);
             }
             if c.exists {
-                let weight = V::load_from(&wz[n..]);
-                let flux = self.flux::<V>(2, sixth_order[2], rigid[2], at, index, weight);
+                let flux = self.flux::<V>(2, six[2], rigid[2], at, index, &wz[n..]);
                 sum = sum + (V::load(&fz[n..]) - flux);
                 flux.store(&mut fz[n..]);
             }
@@ -254,7 +245,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Faces to load for the links along an axis of the row with `index`. Also the first index along
     /// x of the links that have six faces in line, and the index after the last.
-    fn sixth_order_links(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
+    fn six_faces_in_line(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
         let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let [start, end] = [range.start + 2 - index, range.end - 3 - index];
         if along == 0 {
@@ -266,9 +257,10 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Correction of the flux through links along an axis, over h [m/s^2]; zero where `weight` is
-    /// -1. The links have the indices `index` in their row, their lower faces lie from position
-    /// `at` on; `u_q` and `u_c` are U_q and U_c of the first link of the row.
+    /// Correction of the flux through links along an axis, over h [m/s^2]; zero where the weight is
+    /// -1. The links have the indices `index` in their row, and six faces in line from `start` to
+    /// `end`; their lower faces lie from position `at` on. `u_q` and `u_c` are U_q and U_c of the
+    /// first link of the row.
     #[inline(always)]
     fn flux<V: Vector<Number = f64>>(
         &self,
@@ -277,9 +269,10 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         [u_q, u_c]: [f64; 2],
         at: usize,
         index: V,
-        weight: V,
+        weights: &[f32],
     ) -> V {
         let (zero, half) = (V::constant(0.0), V::constant(0.5));
+        let weight = V::load_from(weights);
         // The weight is NO_LINK = -1 where there is no link, and at least 0 elsewhere.
         let between = V::constant(0.5 * NO_LINK);
         if between.mask_below(weight) == 0 {

@@ -58,35 +58,21 @@ pub struct ForcingParams {
 }
 
 impl ForcingParams {
-    /// Parameters for a step of length `dt` [s].
-    pub fn new(
-        scheme: Scheme,
-        eps: f64,
-        spacing: DVec3,
-        kinematic_viscosity: f64,
-        dt: f64,
-    ) -> ForcingParams {
-        ForcingParams {
-            scheme,
-            eps,
-            spacing,
-            // Limited so that products with it fit single precision.
-            diffusion: (dt * kinematic_viscosity).min(1e20 * eps * eps),
-        }
+    /// Parameters for a step of length `dt` [s] in a fluid of kinematic viscosity `nu` [m^2/s].
+    pub fn new(scheme: Scheme, eps: f64, spacing: DVec3, nu: f64, dt: f64) -> ForcingParams {
+        // Limited so that products with it fit single precision.
+        let diffusion = (dt * nu).min(1e20 * eps * eps);
+        ForcingParams { scheme, eps, spacing, diffusion }
     }
 
     /// Strength of the drag as numerator and positive denominator; closed and solid fraction.
     #[inline(always)]
-    pub fn aperture_forcing<V: Vector>(
-        &self,
-        [d, mean]: [V; 2],
-        normal: [V; 3],
-    ) -> ([V; 2], [V; 2]) {
+    pub fn aperture_forcing<V: Vector>(&self, [d, mean]: [V; 2], n: [V; 3]) -> [[V; 2]; 2] {
         let (spacing, eps) = (self.spacing.to_array(), self.eps);
-        let [drag, depth] = drag(d, normal, spacing, eps);
-        let open = pressure_weight(mean, normal, spacing, eps);
+        let [drag, depth] = drag(d, n, spacing, eps);
+        let open = pressure_weight(mean, n, spacing, eps);
         let one = V::constant(1.0);
-        ([self.strength(d, drag), depth], [one - open, one - aperture(d, eps)])
+        [[self.strength(d, drag), depth], [one - open, one - aperture(d, eps)]]
     }
 
     /// Strength at the distances `d` [m] from the drag over viscosity; zero beyond the reach of the
@@ -130,10 +116,10 @@ impl ForcedFaces {
     /// Computes the weights of the faces in `band` as if no other grain were near.
     pub fn compute_weights(&mut self, params: &ForcingParams, band: &mut BandFaces) {
         let count = band.count();
-        let padded = band.pad(params.eps);
-        self.weight.resize(padded, 0.0);
-        self.closed_fraction.resize(padded, 0.0);
-        self.solid_fraction.resize(padded, 0.0);
+        band.pad(params.eps);
+        for list in [&mut self.weight, &mut self.closed_fraction, &mut self.solid_fraction] {
+            list.resize(count + MAX_LANES, 0.0);
+        }
         match params.scheme {
             Scheme::Aperture => dispatch(ComputeFaceWeights { params, band, forced: self }),
             Scheme::Paper => {
@@ -146,11 +132,6 @@ impl ForcedFaces {
                 }
             }
         }
-        for list in [&mut self.weight, &mut self.closed_fraction, &mut self.solid_fraction] {
-            list.truncate(count);
-            list.resize(count + MAX_LANES, 0.0);
-        }
-        self.total_closed_fraction.clear();
     }
 
     /// Fraction of each face that all grains together close, 0 to 1.
@@ -164,14 +145,9 @@ impl ForcedFaces {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let lists = [
-            &self.weight,
-            &self.closed_fraction,
-            &self.total_closed_fraction,
-            &self.solid_fraction,
-        ];
+        let fractions = [&self.closed_fraction, &self.total_closed_fraction, &self.solid_fraction];
         let runs: usize = self.runs.iter().map(Vec::capacity).sum();
-        let values: usize = lists.iter().map(|list| list.capacity()).sum();
+        let values: usize = fractions.into_iter().chain([&self.weight]).map(Vec::capacity).sum();
         size_of::<FaceRun>() * runs
             + size_of::<f32>() * values
             + size_of::<f64>() * self.rest_gain.capacity()
@@ -193,10 +169,10 @@ impl Kernel for ComputeFaceWeights<'_> {
         let ForcedFaces { weight, closed_fraction, solid_fraction, .. } = self.forced;
         let one = V::constant(1.0);
         let inside = V::constant(-self.params.eps);
-        for at in (0..weight.len()).step_by(V::WIDTH) {
+        for at in (0..self.band.count()).step_by(V::WIDTH) {
             let d = V::load(&distance[at..]);
             let distances = [d, V::load(&mean_distance[at..])];
-            let ([strength, depth], [c, solid]) =
+            let [[strength, depth], [c, solid]] =
                 self.params.aperture_forcing(distances, load_all(normal, at));
             // strength / (1 + strength) with a single division.
             let s = strength.div(depth + strength);
@@ -212,8 +188,7 @@ impl Kernel for ComputeFaceWeights<'_> {
 /// normals `n`, as numerator L m and positive denominator m; very large where a face is closed.
 #[inline(always)]
 pub fn drag<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
-    let depth = open_depth(d, eps);
-    let numerator = laplacian::<V, Shear>(d, n, spacing, eps, depth);
+    let [numerator, depth] = laplacian::<V, false>(d, n, spacing, eps);
     let least = V::constant(1e-12 * eps);
     [numerator.max(V::constant(0.0)), depth.max(least)]
 }
@@ -246,47 +221,34 @@ pub fn pressure_weight_of<V: Vector>(
 /// L M and M [m^2] at distances `d` [m] from walls with unit normals `n`.
 #[inline(always)]
 pub fn parabola<V: Vector>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64) -> [V; 2] {
-    let integral = open_depth_integral(d, eps);
-    [laplacian::<V, Parabola>(d, n, spacing, eps, integral), integral]
+    laplacian::<V, true>(d, n, spacing, eps)
 }
 
-/// Velocity profile over a plane wall. A trait, because a closure would not be inlined in a kernel.
-trait Profile {
-    /// Value at the distances `d` [m].
-    fn at<V: Vector>(d: V, eps: f64) -> V;
-}
-
-/// m(d).
-struct Shear;
-/// M(d).
-struct Parabola;
-
-impl Profile for Shear {
-    #[inline(always)]
-    fn at<V: Vector>(d: V, eps: f64) -> V {
-        open_depth(d, eps)
-    }
-}
-
-impl Profile for Parabola {
-    #[inline(always)]
-    fn at<V: Vector>(d: V, eps: f64) -> V {
-        open_depth_integral(d, eps)
-    }
-}
-
-/// Discrete Laplacian of a profile over a plane, which has the value `here` at `d`.
+/// L f and f of a velocity profile f over plane walls: the parabola M(d) or the shear m(d).
 #[inline(always)]
-fn laplacian<V: Vector, P: Profile>(d: V, n: [V; 3], spacing: [f64; 3], eps: f64, here: V) -> V {
+fn laplacian<V: Vector, const PARABOLA: bool>(
+    d: V,
+    n: [V; 3],
+    spacing: [f64; 3],
+    eps: f64,
+) -> [V; 2] {
+    let here = profile::<V, PARABOLA>(d, eps);
     let twice = here + here;
     let mut sum = V::constant(0.0);
     for axis in 0..3 {
         let h = spacing[axis];
         let step = V::constant(h) * n[axis];
-        let rise = P::at(d + step, eps) + P::at(d - step, eps) - twice;
+        let above = profile::<V, PARABOLA>(d + step, eps);
+        let rise = above + profile::<V, PARABOLA>(d - step, eps) - twice;
         sum = rise.mul_add(V::constant(1.0 / (h * h)), sum);
     }
-    sum
+    [sum, here]
+}
+
+/// M(d) or m(d), chosen by a constant: a closure would not be inlined in a kernel.
+#[inline(always)]
+fn profile<V: Vector, const PARABOLA: bool>(d: V, eps: f64) -> V {
+    if PARABOLA { open_depth_integral(d, eps) } else { open_depth(d, eps) }
 }
 
 #[cfg(test)]
