@@ -47,12 +47,12 @@ pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidityInput};
 pub(crate) use update::CouplingInput;
 
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::dem::Grain;
 use crate::flow::Flow;
-use crate::grid::Mesh;
 use crate::math::Real;
 use forcing::{ForcedFaces, ForcingParams};
 use geometry::Locator;
@@ -82,7 +82,8 @@ pub struct ImmersedGrains<R> {
     updates: Vec<GrainUpdate>,
     /// Accesses to the prediction in this step.
     access: AccessLog,
-    mesh: Mesh,
+    /// Spacing of the grid [m].
+    spacing: DVec3,
     kinematic_viscosity: f64,
 }
 
@@ -103,7 +104,7 @@ impl<R: Real> ImmersedGrains<R> {
             scratch: ScratchPool::new(),
             updates: Vec::with_capacity(grains.len()),
             access: AccessLog::default(),
-            mesh: *flow.mesh(),
+            spacing: flow.mesh().spacing,
             kinematic_viscosity,
         };
         immersed.locate(grains);
@@ -113,7 +114,6 @@ impl<R: Real> ImmersedGrains<R> {
     /// Moves the grains to the grid of `flow`, with the same spacing as the last one, and lists the
     /// faces near them at their present poses.
     pub fn move_to_grid(&mut self, flow: &Flow<R>, grains: &[Grain]) {
-        self.mesh = *flow.mesh();
         self.locator.set_grid(flow.mesh(), flow.boundaries());
         self.locate(grains);
     }
@@ -142,8 +142,8 @@ impl<R: Real> ImmersedGrains<R> {
 
     /// Parameters of the forcing in a step of `dt` [s].
     fn forcing_params(&self, dt: f64) -> ForcingParams {
-        let (eps, spacing) = (self.locator.eps(), self.mesh.spacing);
-        ForcingParams::new(self.scheme, eps, spacing, self.kinematic_viscosity, dt)
+        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
+        ForcingParams::new(self.scheme, eps, self.spacing, nu, dt)
     }
 
     /// Memory held without the buffers of threads [bytes].

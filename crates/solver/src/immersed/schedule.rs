@@ -134,10 +134,7 @@ impl<R: Real> ImmersedGrains<R> {
     pub(super) fn find_isolated(&mut self, input: &CouplingInput, updates: &mut Vec<GrainUpdate>) {
         let (immersed, grains) = (&self.grains, input.grains);
         let reach = self.locator.reach();
-        let displacement = |index: usize| {
-            let last = immersed[index].body.position;
-            grains[index].pose.position.distance(last)
-        };
+        let displacement = |i: usize| grains[i].pose.position.distance(immersed[i].body.position);
         // A caller may have wrapped a grain into the box: its last faces are elsewhere.
         let stayed = |index: usize| displacement(index) <= reach;
         // The margin covers the rounding of distances, which are in single precision.
@@ -211,16 +208,9 @@ impl<R: Real> ImmersedGrains<R> {
         for (index, update) in updates.iter().enumerate() {
             if update.isolated && update.pending.is_some() {
                 let ImmersedGrain { body, forced, .. } = &mut self.grains[index];
-                let (grain, scratch) = (&step.grains[index], &mut self.scratch.borrow().locate);
-                locate_and_compute_weights(
-                    &self.locator,
-                    &params,
-                    index,
-                    grain,
-                    body,
-                    forced,
-                    scratch,
-                );
+                let (locator, grain) = (&self.locator, &step.grains[index]);
+                let scratch = &mut self.scratch.borrow().locate;
+                locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
                 forced.rest_gain.clear();
                 forced.rest_gain.resize(forced.weight.len(), 0.0);
             }
