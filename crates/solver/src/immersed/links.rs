@@ -195,10 +195,9 @@ impl RigidLinks {
     #[inline(always)]
     pub fn first_of_row(&self, [j, k]: [i32; 2]) -> [[f64; 2]; 3] {
         let ([y, z], [_, by_y, by_z]) = ([j, k].map(f64::from), &self.change);
-        let sum = |along: usize, of: usize| {
-            self.first[along][of] + y * by_y[along][of] + z * by_z[along][of]
-        };
-        [0, 1, 2].map(|along| [sum(along, 0), sum(along, 1)])
+        [0, 1, 2].map(|along| {
+            [0, 1].map(|of| self.first[along][of] + y * by_y[along][of] + z * by_z[along][of])
+        })
     }
 }
 

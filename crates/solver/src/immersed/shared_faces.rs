@@ -200,9 +200,7 @@ impl Kernel for Evaluate<'_> {
     fn run<V: Vector<Number = f64>>(self) {
         let Evaluate { params, distances, surface } = self;
         let (eps, spacing) = (params.eps, params.spacing.to_array());
-        let [x, y, z] = surface.normal.to_array();
-        let normal = [Scalar(x), Scalar(y), Scalar(z)];
-        let (d, mean) = (Scalar(distances[0]), Scalar(distances[1]));
+        let (normal, [d, mean]) = (surface.normal.to_array().map(Scalar), distances.map(Scalar));
         let [curvature, depth] = drag(d, normal, spacing, eps);
         let mean_shear = drag(mean, normal, spacing, eps);
         let driven = parabola(mean, normal, spacing, eps);

@@ -150,14 +150,13 @@ impl<R: Real> CouplingContext<'_, R> {
     pub fn update_isolated(
         &self,
         index: usize,
-        grain: &mut ImmersedGrain,
+        ImmersedGrain { body, located_for, .. }: &mut ImmersedGrain,
         update: &mut GrainUpdate,
         predictions: &mut [Prediction<R>; 3],
         scratch: &mut ThreadScratch<R>,
     ) {
         let ThreadScratch { advection, locate, correction, forced } = scratch;
-        grain.located_for = None;
-        let body = &mut grain.body;
+        *located_for = None;
         if self.params.scheme == Scheme::Aperture {
             let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
             let (nu, known) = (self.kinematic_viscosity, &self.known);
@@ -166,11 +165,10 @@ impl<R: Real> CouplingContext<'_, R> {
                 add_correction(body, correction, component, prediction);
             }
         }
-        self.locate(index, body, forced, locate);
-        update.system = self.assemble(index, predictions, forced);
         let (grain, previous) = (&self.input.grains[index], &self.input.previous[index]);
-        let no_contact = Load::default();
-        let velocity = (update.system).velocities(grain, previous, no_contact, self.input.dt);
+        locate_and_compute_weights(self.locator, &self.params, index, grain, body, forced, locate);
+        update.system = self.assemble(index, predictions, forced);
+        let velocity = update.system.velocities(grain, previous, Load::default(), self.input.dt);
         let change = velocity - previous.velocity;
         let h = self.known.mesh.spacing;
         for (axis, prediction) in predictions.iter_mut().enumerate() {
@@ -183,32 +181,20 @@ impl<R: Real> CouplingContext<'_, R> {
     pub fn locate_and_assemble(
         &self,
         index: usize,
-        grain: &mut ImmersedGrain,
+        ImmersedGrain { body, forced, located_for, located_beside, .. }: &mut ImmersedGrain,
         update: &mut GrainUpdate,
         predictions: &[Prediction<R>; 3],
         scratch: &mut LocateScratch,
     ) {
-        let neighbours = self.locator.neighbours(index);
-        let now = Some((self.input.grains[index].pose, self.input.dt));
+        let (locator, params, grain) = (self.locator, &self.params, &self.input.grains[index]);
+        let (now, neighbours) = (Some((grain.pose, self.input.dt)), locator.neighbours(index));
         // The lists of a grain in a bed at rest stay as they are.
-        if grain.located_for != now || grain.located_beside != neighbours {
-            self.locate(index, &mut grain.body, &mut grain.forced, scratch);
-            grain.located_for = now;
-            grain.located_beside.clear();
-            grain.located_beside.extend_from_slice(neighbours);
+        if *located_for != now || *located_beside != neighbours {
+            locate_and_compute_weights(locator, params, index, grain, body, forced, scratch);
+            *located_for = now;
+            neighbours.clone_into(located_beside);
         }
-        update.system = self.assemble(index, predictions, &mut grain.forced);
-    }
-
-    fn locate(
-        &self,
-        index: usize,
-        body: &mut LocatedBody,
-        forced: &mut ForcedFaces,
-        scratch: &mut LocateScratch,
-    ) {
-        let (params, grain) = (&self.params, &self.input.grains[index]);
-        locate_and_compute_weights(self.locator, params, index, grain, body, forced, scratch);
+        update.system = self.assemble(index, predictions, forced);
     }
 
     /// Sums the impulse of the fluid and assembles the equations of motion.
