@@ -119,8 +119,7 @@ impl<R: Real> Kernel for SumImpulse<'_, R> {
                     acceleration: RigidRun::new(self.acceleration, run.lever_arm, spacing),
                     dt: self.dt,
                     cells: [above, -above].map(shifted),
-                    dt_per_2h: (0.5 * self.dt / spacing).to_array(),
-                    dt_per_h: self.dt / spacing[axis],
+                    dt_per_h: (self.dt / spacing).to_array(),
                     dt_g: self.dt * self.known.body_acceleration[axis],
                     spacing: spacing.x,
                 };
@@ -160,10 +159,8 @@ struct RunImpulse<'a, R> {
     dt: f64,
     /// U_old at the centres of the cells above and below the faces [m/s].
     cells: [RigidRun; 2],
-    /// dt / (2 h) along each axis [s/m].
-    dt_per_2h: [f64; 3],
-    /// dt / h along the component [s/m].
-    dt_per_h: f64,
+    /// dt / h along each axis [s/m].
+    dt_per_h: [f64; 3],
     /// dt a along the component, with the body acceleration a [m/s].
     dt_g: f64,
     /// h along x [m].
@@ -179,7 +176,7 @@ impl<R: Real> RunImpulse<'_, R> {
         let [mut moved, neighbours @ ..] = self.stencil.load_within::<V, R>(self.pressure, at);
         for axis in 0..3 {
             let velocity = self.cells[side].component(axis, lane_indices(n));
-            let displacement = V::constant(-self.dt_per_2h[axis]) * velocity;
+            let displacement = V::constant(-0.5 * self.dt_per_h[axis]) * velocity;
             let difference = neighbours[2 * axis] - neighbours[2 * axis + 1];
             moved = displacement.mul_add(difference, moved);
         }
@@ -198,7 +195,7 @@ impl<R: Real> RunImpulse<'_, R> {
         let (zero, index) = (V::constant(0.0), lane_indices::<V>(n));
         let predicted = V::load_partial(&self.predicted[n..]);
         let rise = self.moved_pressure::<V>(0, n) - self.moved_pressure(1, n);
-        let e = rise.mul_add(V::constant(self.dt_per_h), V::constant(-self.dt_g));
+        let e = rise.mul_add(V::constant(self.dt_per_h[self.axis]), V::constant(-self.dt_g));
         let without_drag = total_closed_fraction.mul_add(e, predicted);
         let rest_gain = (zero - weight).mul_add(without_drag, closed_fraction * e);
         let expected = V::constant(self.dt) * self.acceleration.component(self.axis, index);
