@@ -243,8 +243,8 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         }
     }
 
-    /// Faces to load for the links along an axis of the row with `index`. Also the first index along
-    /// x of the links that have six faces in line, and the index after the last.
+    /// Faces to load for the links along an axis of the row with `index`; first index along x of
+    /// the links that have six faces in line, and the index after the last.
     fn six_faces_in_line(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
         let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let [start, end] = [range.start + 2 - index, range.end - 3 - index];

@@ -26,15 +26,15 @@ use super::geometry::aperture::{aperture, forcing_reach, open_depth, open_depth_
 use super::geometry::{BandFaces, FaceRun, load_all};
 use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
-/// Forcing of a face by one grain, or by several together.
+/// Forcing of a face by one grain, or by several together. The fractions are zero in the paper's
+/// scheme, which uses the weight alone.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,
-    /// Fraction of the face closed to the pressure gradient, 1 - P; zero in the paper's scheme,
-    /// which uses the weight alone.
+    /// Fraction of the face closed to the pressure gradient, 1 - P.
     pub closed_fraction: f64,
-    /// Solid fraction of the face, 1 - A; zero in the paper's scheme, which uses the weight alone.
+    /// Solid fraction of the face, 1 - A.
     pub solid_fraction: f64,
 }
 

@@ -59,9 +59,9 @@ impl LinkPlanes {
     }
 }
 
-/// Returns the indices along x of the unknown faces of row (j, k) within reach of the grain, if
-/// any, and the entry of the first in [`LocatedBody::distance`]; `x`, `y` and `z` are the indices of
-/// the unknowns along each axis.
+/// Returns the indices along x of the unknown faces of row (j, k) within reach, if any, and their
+/// first entry in [`LocatedBody::distance`]; `x`, `y` and `z` are the indices of the unknowns along
+/// each axis.
 #[inline(always)]
 pub fn listed_faces(
     body: &LocatedBody,

@@ -19,9 +19,9 @@
 //! film loads a grain, the caller (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5,
 //! with `CoupledGrains::responses`.
 //!
-//! `update.rs` does the work on one grain. `open_sides.rs` and `emerged.rs` treat grains that leave
-//! the box or float in a free surface, `initial.rs` sets the flow at t = 0. Every kernel has a plain
-//! scalar form in `reference/`, against which it is tested.
+//! `links.rs` has the links of stage 1, `update.rs` the work on one grain. `open_sides.rs` and
+//! `emerged.rs` treat grains that leave the box or float in a free surface, `initial.rs` sets the
+//! flow at t = 0. Every kernel has a plain scalar form in `reference/`, against which it is tested.
 
 mod advection;
 mod emerged;

@@ -57,8 +57,8 @@ pub struct RigidBodySystem {
     right: Vector6,
     virtual_mass: VirtualMass,
     impulse: Impulse,
-    /// Of a part of the grain beyond a free surface: inertia of the fluid that the part does not
-    /// displace, and load of the pressure at the surface.
+    /// Inertia of fluid that a part of the grain beyond a free surface does not displace, and load
+    /// of the pressure at this surface.
     surface: Option<(Matrix6, Load)>,
     /// Load of a grain that leaves the box.
     last_load: Option<Load>,
