@@ -206,7 +206,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
         let [a, b, c] = &self.axes;
         let index = [0, j, k];
-        let six = [0, 1, 2].map(|along| self.six_faces_in_line(along, index));
+        let advected = [0, 1, 2].map(|along| self.advected_faces(along, index));
         let rigid = self.rigid.first_of_row([j, k]);
         let row_length = planes.row_length;
         let LinkPlanes { weight, flux_y, flux_z, .. } = planes;
@@ -218,17 +218,17 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             let at = at.wrapping_add(n);
             let mut sum = zero;
             if a.exists {
-                let flux = self.flux::<V>(0, six[0], rigid[0], at, index, &wx[n..]);
+                let flux = self.flux::<V>(0, advected[0], rigid[0], at, index, &wx[n..]);
                 sum = flux.shift(last_flux) - flux;
                 last_flux = flux;
             }
             if b.exists {
-                let flux = self.flux::<V>(1, six[1], rigid[1], at, index, &wy[n..]);
+                let flux = self.flux::<V>(1, advected[1], rigid[1], at, index, &wy[n..]);
                 sum = sum + (V::load(&fy[n..]) - flux);
                 flux.store(&mut fy[n..]);
             }
             if c.exists {
-                let flux = self.flux::<V>(2, six[2], rigid[2], at, index, &wz[n..]);
+                let flux = self.flux::<V>(2, advected[2], rigid[2], at, index, &wz[n..]);
                 sum = sum + (V::load(&fz[n..]) - flux);
                 flux.store(&mut fz[n..]);
             }
@@ -245,7 +245,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Faces to load for the links along an axis of the row with `index`; first index along x of
     /// the links that have six faces in line, and the index after the last.
-    fn six_faces_in_line(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
+    fn advected_faces(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
         let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let [start, end] = [range.start + 2 - index, range.end - 3 - index];
         if along == 0 {
