@@ -1,8 +1,8 @@
-//! Grain: a shared shape, density, material, pose and velocities.
+//! Grain: a shared shape, density, material, pose and velocities; its set-up, energy and momentum.
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
@@ -41,12 +41,59 @@ pub struct Grain {
 }
 
 impl Grain {
-    /// Removes the grain from the box: it is held at rest at infinity from now on.
-    pub fn leave(&mut self) {
-        self.pose.position = DVec3::INFINITY;
+    /// Free grain of `density` [kg/m^3] at rest at the origin.
+    pub fn new(shape: impl Into<Arc<Shape>>, density: f64) -> Grain {
+        Grain {
+            shape: shape.into(),
+            density,
+            material: Material::default(),
+            pose: Pose { position: DVec3::ZERO, orientation: DQuat::IDENTITY },
+            velocity: DVec3::ZERO,
+            angular_velocity: DVec3::ZERO,
+            translation: MotionConstraint::Free,
+            rotation: MotionConstraint::Free,
+        }
+    }
+    /// Replaces the position of the centroid [m].
+    pub fn with_position(mut self, position: DVec3) -> Grain {
+        self.pose.position = position;
+        self
+    }
+    /// Replaces the orientation (body frame to space frame).
+    pub fn with_orientation(mut self, orientation: DQuat) -> Grain {
+        self.pose.orientation = orientation;
+        self
+    }
+    /// Replaces the material.
+    pub fn with_material(mut self, material: Material) -> Grain {
+        self.material = material;
+        self
+    }
+    /// Replaces the initial velocity of the centroid [m/s].
+    pub fn with_velocity(mut self, velocity: DVec3) -> Grain {
+        self.velocity = velocity;
+        self
+    }
+    /// Replaces the initial angular velocity, space frame [rad/s].
+    pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
+        self.angular_velocity = angular_velocity;
+        self
+    }
+    /// Holds the grain still.
+    pub fn held(mut self) -> Grain {
+        self.hold();
+        self
+    }
+    /// Sets both velocities to zero and prescribes them.
+    fn hold(&mut self) {
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
         let held = MotionConstraint::Prescribed(DVec3::ZERO);
         (self.translation, self.rotation) = (held, held);
+    }
+    /// Removes the grain from the box: it is held at rest at infinity from now on.
+    pub fn leave(&mut self) {
+        self.pose.position = DVec3::INFINITY;
+        self.hold();
     }
     /// Returns whether the grain has left the box.
     pub fn has_left(&self) -> bool {
@@ -63,7 +110,7 @@ impl Grain {
     /// Inertia tensor in the space frame [kg m^2].
     pub fn inertia(&self) -> DMat3 {
         let rotation = DMat3::from_quat(self.pose.orientation);
-        rotation * DMat3::from_diagonal(self.shape.inertia() * self.density) * rotation.transpose()
+        rotation * DMat3::from_diagonal(self.principal_inertia()) * rotation.transpose()
     }
     /// Principal moments of inertia [kg m^2].
     pub fn principal_inertia(&self) -> DVec3 {
@@ -79,7 +126,23 @@ impl Grain {
     }
     /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
-        self.velocity + self.angular_velocity.cross(x - self.pose.position)
+        self.rigid_velocity().at(x - self.pose.position)
+    }
+    /// Kinetic energy of translation and rotation [J].
+    pub fn kinetic_energy(&self) -> f64 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        0.5 * self.mass() * self.velocity.length_squared()
+            + 0.5 * omega.dot(self.principal_inertia() * omega)
+    }
+    /// Linear momentum [kg m/s].
+    pub fn momentum(&self) -> DVec3 {
+        self.mass() * self.velocity
+    }
+    /// Angular momentum about the point `about` [kg m^2/s, space frame].
+    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        (self.pose.position - about).cross(self.momentum())
+            + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }
 

@@ -14,8 +14,6 @@
 mod contact;
 mod enclosure;
 mod grain;
-mod grain_builder;
-mod grain_diagnostics;
 mod material;
 mod motion;
 mod search;
