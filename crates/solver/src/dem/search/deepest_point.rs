@@ -9,9 +9,6 @@ use super::surface::{PartnerField, SurfacePoint, is_sphere, project_to_surface};
 
 /// First and last radius of the compass search [node spacings].
 const COMPASS_RADII: [f64; 2] = [0.25, 0.02];
-/// Limits of a descent, with lengths in node spacings. The compass search that follows is finer.
-const DESCENT: DescentLimits = DescentLimits { stride: 1.0, tolerance: 0.02, iterations: 10 };
-
 /// Largest depth of a minimum below a node that the search assumes [node spacings].
 const DEPTH_BELOW_NODES: f64 = 0.1;
 /// Least distance between the nodes from which descents start [node spacings].
@@ -29,7 +26,9 @@ pub(super) fn deepest_point_of_sphere(
     candidates: &[(f64, u32)],
 ) -> SurfacePoint {
     let spacing = sphere.tree.spacing;
-    let descend = |start| minimise_distance(sphere.shape, partner, start, DESCENT.scaled(spacing));
+    // The compass search that follows the descent is finer.
+    let limits = DescentLimits { stride: spacing, tolerance: 0.02 * spacing, iterations: 10 };
+    let descend = |start| minimise_distance(sphere.shape, partner, start, limits);
     let mut deepest = descend(nearest);
     let (mut starts, mut count) = ([nearest.position; MOST_STARTS], 1);
     let limit = nearest.distance + DEPTH_BELOW_NODES * spacing;
@@ -61,13 +60,6 @@ pub(super) struct DescentLimits {
     pub tolerance: f64,
     /// Most steps.
     pub iterations: usize,
-}
-
-impl DescentLimits {
-    /// Limits whose lengths are multiplied by `length`.
-    fn scaled(self, length: f64) -> DescentLimits {
-        DescentLimits { stride: self.stride * length, tolerance: self.tolerance * length, ..self }
-    }
 }
 
 /// Local minimum, on `surface`, of the distance in the field of `partner`, at least as deep as

@@ -107,8 +107,7 @@ fn test_patch(
     found: &mut Vec<PenetratingPoint>,
 ) -> f64 {
     let patch = &tree.patches[index as usize];
-    let extent = patch.extent_towards(partner);
-    let distance = partner.distance_within(patch.position, reach + extent) - extent;
+    let distance = patch.distance_within(partner, reach);
     if distance < 0.0
         && let Some(point) = patch.deepest_point(partner)
         && point.distance < 0.0
@@ -134,8 +133,7 @@ pub(super) fn scan_patches(
     *slack = CANDIDATE_RANGE * tree.spacing;
     let mut nearest = NearestPatch { distance: range, index: None };
     if let Some((index, patch)) = seed.and_then(|n| Some((n, tree.patches.get(n as usize)?))) {
-        let extent = patch.extent_towards(partner);
-        nearest.update(partner.distance_within(patch.position, range + extent) - extent, index);
+        nearest.update(patch.distance_within(partner, range), index);
     }
     let extent = if partner.is_wall() { tree.extent } else { 0.0 };
     let mut cluster_index = 0;

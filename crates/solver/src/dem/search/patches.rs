@@ -100,9 +100,10 @@ impl SurfacePatch {
         SurfacePatch { extent: first.hypot(second), normal, arcs, ..SurfacePatch::point(node) }
     }
 
-    /// Bound of the distance from the middle of the points that may touch `partner` [m].
-    pub(super) fn extent_towards(&self, partner: &PartnerField) -> f64 {
-        if partner.is_wall() { self.extent } else { 0.0 }
+    /// Lower bound of the distance from `partner` [m], or infinity beyond `reach` [m].
+    pub(super) fn distance_within(&self, partner: &PartnerField, reach: f64) -> f64 {
+        let extent = if partner.is_wall() { self.extent } else { 0.0 };
+        partner.distance_within(self.position, reach + extent) - extent
     }
 
     /// Deepest point in a wall; in a grain, whose surface is curved too, the middle of the patch.
