@@ -47,10 +47,10 @@ impl Side {
 /// Face of the box as a half space: a grain inside the box is on the side of `inward`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WallFace {
+    /// The face as the second body of a contact.
+    pub partner: Partner,
     /// Axis of the normal.
     pub axis: usize,
-    /// 0 lower, 1 upper.
-    pub side: usize,
     /// Unit normal into the box: the gradient of the wall's distance field.
     pub inward: DVec3,
     /// Coordinate of the face along its axis [m].
@@ -79,20 +79,20 @@ impl Enclosure {
             [0, 1, 2].map(|axis| if self.is_periodic(axis) { self.size()[axis] } else { 0.0 }),
         )
     }
-    /// Face `side` of `axis`, if it is a wall for grains.
-    pub(super) fn face(&self, axis: usize, side: usize) -> Option<WallFace> {
-        let solid = self.sides[axis][side] != Side::Open && !self.is_periodic(axis);
-        solid.then(|| self.plane(axis, side))
-    }
     /// Face `side` of `axis` as a plane, solid or not.
     pub(super) fn plane(&self, axis: usize, side: usize) -> WallFace {
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let corner = if side == 0 { self.lower } else { self.upper };
-        WallFace { axis, side, inward: sign * DVec3::AXES[axis], coordinate: corner[axis] }
+        let partner = Partner::Wall { axis: axis as u8, side: side as u8 };
+        WallFace { partner, axis, inward: sign * DVec3::AXES[axis], coordinate: corner[axis] }
     }
     /// All faces that are walls for grains.
     pub(super) fn faces(&self) -> impl Iterator<Item = WallFace> + '_ {
-        (0..6).filter_map(|k| self.face(k / 2, k % 2))
+        let faces = (0..6).map(|k| (k / 2, k % 2));
+        let solid = faces.filter(|&(axis, side)| {
+            self.sides[axis][side] != Side::Open && !self.is_periodic(axis)
+        });
+        solid.map(|(axis, side)| self.plane(axis, side))
     }
     /// Number of periods in each component of `distance` [m], rounded by `round`; zero along axes
     /// that are not periodic.
@@ -136,12 +136,6 @@ pub enum Partner {
     },
 }
 
-impl From<&WallFace> for Partner {
-    fn from(face: &WallFace) -> Partner {
-        Partner::Wall { axis: face.axis as u8, side: face.side as u8 }
-    }
-}
-
 /// Key of a pair, ordered by grain, then partner (grains before walls), then image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PairKey {
@@ -151,13 +145,6 @@ pub(crate) struct PairKey {
     pub partner: Partner,
     /// Periods from the partner's own position to the image in question.
     pub image: [i32; 3],
-}
-
-impl PairKey {
-    /// Pair of a grain with a wall.
-    pub(super) fn wall(grain: u32, face: &WallFace) -> PairKey {
-        PairKey { grain, partner: face.into(), image: [0; 3] }
-    }
 }
 
 #[cfg(test)]
@@ -185,7 +172,7 @@ mod tests {
         let box_ = channel();
         let faces: Vec<_> = box_.faces().collect();
         assert_eq!(faces.len(), 1);
-        assert_eq!((faces[0].axis, faces[0].side), (1, 0));
+        assert_eq!(faces[0].partner, Partner::Wall { axis: 1, side: 0 });
         assert_eq!(faces[0].distance(DVec3::new(9.0, -0.25, 9.0)), -0.25);
         assert_eq!(box_.plane(2, 1).distance(DVec3::new(0.0, 0.0, 2.0)), 1.0);
     }

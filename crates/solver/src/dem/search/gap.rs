@@ -8,11 +8,6 @@ use super::surface::{PartnerField, SurfacePoint};
 use crate::dem::enclosure::{Enclosure, Partner, WallFace};
 use crate::dem::grain::Grain;
 
-/// Most steps of the descent to the closest point; smooth surfaces need only a few.
-const ITERATIONS: usize = 40;
-/// Tolerance of the closest point as a fraction of the bounding radius.
-const TOLERANCE: f64 = 1e-9;
-
 /// Overlap of two grains, or of a grain and a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
@@ -39,21 +34,21 @@ pub struct Outside {
     pub centroid: bool,
 }
 
-/// Point of the grain's surface with the smallest distance in `field`: descent from the closest
-/// node.
-fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
+/// Smallest distance of the grain's surface in `field` [m]: descent from the closest node.
+fn smallest_distance(owner: &Grain, field: &PartnerField) -> f64 {
     let mut best: Option<(f64, DVec3)> = None;
     for node in owner.shape.nodes() {
-        let distance = field.distance_within(node.position, f64::INFINITY);
+        let distance = field.distance(node.position);
         if best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, node.position));
         }
     }
     let radius = owner.shape.bounding_radius();
-    let start = SurfacePoint::at(field, best?.1)?;
-    let limits =
-        DescentLimits { stride: radius, tolerance: TOLERANCE * radius, iterations: ITERATIONS };
-    Some(minimise_distance(&owner.shape, field, start, limits))
+    // Smooth surfaces need only a few steps.
+    let limits = DescentLimits { stride: radius, tolerance: 1e-9 * radius, iterations: 40 };
+    let start = best.and_then(|(_, position)| SurfacePoint::at(field, position));
+    let minimum = start.map(|start| minimise_distance(&owner.shape, field, start, limits));
+    minimum.map_or(f64::INFINITY, |point| point.distance)
 }
 
 /// Smallest distance of the surface of `owner` in the field of `other` [m]; `branch` is the vector
@@ -61,8 +56,7 @@ fn closest_point(owner: &Grain, field: &PartnerField) -> Option<SurfacePoint> {
 fn one_way_gap(owner: &Grain, other: &Grain, branch: DVec3) -> f64 {
     let to_other = DMat3::from_quat(other.pose.orientation.conjugate());
     let rotation = to_other * DMat3::from_quat(owner.pose.orientation);
-    let field = PartnerField::grain(&other.shape, rotation, to_other * -branch);
-    closest_point(owner, &field).map_or(f64::INFINITY, |point| point.distance)
+    smallest_distance(owner, &PartnerField::grain(&other.shape, rotation, to_other * -branch))
 }
 
 /// Smallest gap of `a` to the images of `b` other than `skip` [m]; at most `limit` [m].
@@ -112,34 +106,31 @@ pub fn surface_gap(a: &Grain, b: &Grain, enclosure: &Enclosure) -> f64 {
 fn wall_face_gap(grain: &Grain, face: &WallFace) -> f64 {
     let to_body = grain.pose.orientation.conjugate();
     let offset = face.distance(grain.pose.position);
-    let field = PartnerField::HalfSpace { normal: to_body * face.inward, offset };
-    closest_point(grain, &field).map_or(f64::INFINITY, |point| point.distance)
+    smallest_distance(grain, &PartnerField::HalfSpace { normal: to_body * face.inward, offset })
 }
 
 /// Gap between the grain's surface and the nearest wall [m] (negative: overlap), and that wall.
 pub fn wall_gap(grain: &Grain, enclosure: &Enclosure) -> Option<(f64, Partner)> {
-    let gaps = enclosure.faces().map(|face| (wall_face_gap(grain, &face), Partner::from(&face)));
+    let gaps = enclosure.faces().map(|face| (wall_face_gap(grain, &face), face.partner));
     gaps.min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
 /// All overlaps of grains with grains, with their own images and with walls.
 pub fn initial_overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = Vec::new();
+    let mut add = |grain, partner, gap: f64| {
+        if gap < 0.0 {
+            found.push(Overlap { grain, partner, depth: -gap });
+        }
+    };
     for (i, a) in grains.iter().enumerate() {
         for (j, b) in grains.iter().enumerate().skip(i) {
             let skip = (i == j).then_some(IVec3::ZERO);
-            let gap = gap_of_images(a, b, enclosure, skip, 0.0);
-            if gap < 0.0 {
-                found.push(Overlap { grain: i, partner: Partner::Grain(j), depth: -gap });
-            }
+            add(i, Partner::Grain(j), gap_of_images(a, b, enclosure, skip, 0.0));
         }
         for face in enclosure.faces() {
-            if face.distance(a.pose.position) > a.shape.bounding_radius() {
-                continue;
-            }
-            let gap = wall_face_gap(a, &face);
-            if gap < 0.0 {
-                found.push(Overlap { grain: i, partner: Partner::from(&face), depth: -gap });
+            if face.distance(a.pose.position) <= a.shape.bounding_radius() {
+                add(i, face.partner, wall_face_gap(a, &face));
             }
         }
     }

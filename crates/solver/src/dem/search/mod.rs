@@ -79,7 +79,8 @@ impl BroadPhase {
             }
             for face in enclosure.faces() {
                 if face.distance(sphere.centre) <= sphere.radius {
-                    self.pairs.push(PairKey::wall(own.grain, &face));
+                    let partner = face.partner;
+                    self.pairs.push(PairKey { grain: own.grain, partner, image: [0; 3] });
                 }
             }
         }
