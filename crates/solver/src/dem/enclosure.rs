@@ -34,14 +34,6 @@ pub enum Side {
 impl Side {
     /// A wall with friction, at rest.
     pub const WALL: Side = Side::Wall { velocity: DVec3::ZERO };
-
-    /// Velocity of a wall in its own plane [m/s].
-    pub(super) fn velocity(self) -> DVec3 {
-        match self {
-            Side::Wall { velocity } => velocity,
-            Side::Open | Side::Frictionless => DVec3::ZERO,
-        }
-    }
 }
 
 /// Face of the box as a half space: a grain inside the box is on the side of `inward`.
@@ -134,6 +126,16 @@ pub enum Partner {
         /// 0 lower, 1 upper.
         side: u8,
     },
+}
+
+impl Partner {
+    /// Index of the partner, if it is a grain.
+    pub(super) fn grain(self) -> Option<usize> {
+        match self {
+            Partner::Grain(index) => Some(index),
+            Partner::Wall { .. } => None,
+        }
+    }
 }
 
 /// Key of a pair, ordered by grain, then partner (grains before walls), then image.

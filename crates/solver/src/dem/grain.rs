@@ -19,6 +19,16 @@ pub enum MotionConstraint {
     Prescribed(DVec3),
 }
 
+impl MotionConstraint {
+    /// Prescribed velocity, or `free` if the velocity is free.
+    pub(super) fn velocity(self, free: DVec3) -> DVec3 {
+        match self {
+            MotionConstraint::Free => free,
+            MotionConstraint::Prescribed(velocity) => velocity,
+        }
+    }
+}
+
 /// One grain. Velocities are at integer time levels, in the space frame.
 #[derive(Clone, Debug)]
 pub struct Grain {

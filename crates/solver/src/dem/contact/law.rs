@@ -4,17 +4,6 @@
 use std::f64::consts::PI;
 use std::fmt::Debug;
 
-/// Elastic constants of one body as contact laws use them.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::dem) struct ContactMaterial {
-    /// (1 - nu^2) / E [1/Pa].
-    pub normal_compliance: f64,
-    /// (2 - nu) / G [1/Pa].
-    pub tangential_compliance: f64,
-    /// Damping ratio of the restitution.
-    pub damping_ratio: f64,
-}
-
 /// Properties of a pair that do not change during a contact.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct PairProperties {
@@ -30,35 +19,43 @@ pub(in crate::dem) struct PairProperties {
     pub damping_ratio: f64,
 }
 
-/// Properties of one body of a pair.
+/// Properties of one body of a pair, a grain or a wall.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct BodyProperties {
-    /// Inverse of the mass, with added mass [1/kg].
+    /// Inverse of the mass, with added mass [1/kg]; zero for a wall.
     pub inverse_mass: f64,
-    /// Radius of the equal-volume sphere [m].
+    /// Radius of the equal-volume sphere [m]; infinite for a wall.
     pub radius: f64,
-    /// Elastic constants.
-    pub material: ContactMaterial,
+    /// Share of the body in the normal compliance, (1 - nu^2) / E [1/Pa].
+    pub normal_compliance: f64,
+    /// Share in the tangential compliance, (2 - nu) / G with G = E / (2 (1 + nu)) [1/Pa].
+    pub tangential_compliance: f64,
+    /// Damping ratio of the restitution.
+    pub damping_ratio: f64,
 }
 
 impl PairProperties {
-    /// Properties of a grain and its partner. A partner of `None` is a wall of the material `wall`,
-    /// whose mass and radius are infinite.
-    pub fn new(
-        grain: &BodyProperties,
-        partner: Option<&BodyProperties>,
-        wall: &ContactMaterial,
-    ) -> PairProperties {
-        let (a, b) = (&grain.material, partner.map_or(wall, |partner| &partner.material));
+    /// Properties of a grain `a` and its partner `b`.
+    pub fn new(a: &BodyProperties, b: &BodyProperties) -> PairProperties {
+        let reduced_radius = if b.radius.is_finite() {
+            a.radius * b.radius / (a.radius + b.radius)
+        } else {
+            a.radius
+        };
         PairProperties {
-            inverse_mass: grain.inverse_mass + partner.map_or(0.0, |partner| partner.inverse_mass),
-            reduced_radius: partner.map_or(grain.radius, |partner| {
-                grain.radius * partner.radius / (grain.radius + partner.radius)
-            }),
+            inverse_mass: a.inverse_mass + b.inverse_mass,
+            reduced_radius,
             effective_youngs_modulus: 1.0 / (a.normal_compliance + b.normal_compliance),
             effective_shear_modulus: 1.0 / (a.tangential_compliance + b.tangential_compliance),
             damping_ratio: a.damping_ratio.max(b.damping_ratio),
         }
+    }
+
+    /// Coefficient [N s/m] of a dashpot beside a spring of `stiffness` [N/m]; zero if neither body
+    /// can move.
+    fn dashpot(&self, damping_ratio: f64, stiffness: f64) -> f64 {
+        let is_movable = self.inverse_mass > 0.0;
+        if is_movable { 2.0 * damping_ratio * (stiffness / self.inverse_mass).sqrt() } else { 0.0 }
     }
 }
 
@@ -115,15 +112,10 @@ pub(super) struct Linear {
 impl ContactLaw for Linear {
     fn coefficients(&self, pair: &PairProperties, overlap: f64) -> ContactCoefficients {
         let k = self.normal_stiffness;
-        let normal_damping = if pair.inverse_mass > 0.0 {
-            2.0 * self.damping_ratio * (k / pair.inverse_mass).sqrt()
-        } else {
-            0.0
-        };
         ContactCoefficients {
             normal_force: k * overlap,
             normal_energy: 0.5 * k * overlap * overlap,
-            normal_damping,
+            normal_damping: pair.dashpot(self.damping_ratio, k),
             tangential_stiffness: self.tangential_stiffness,
             tangential_damping_ratio: self.tangential_damping_ratio,
         }
@@ -176,15 +168,10 @@ impl ContactLaw for HertzMindlin {
         let normal_force = 4.0 / 3.0 * pair.effective_youngs_modulus * contact_radius * overlap;
         let normal_stiffness = 2.0 * pair.effective_youngs_modulus * contact_radius;
         let tangential_stiffness = 8.0 * pair.effective_shear_modulus * contact_radius;
-        let normal_damping = if pair.inverse_mass > 0.0 {
-            2.0 * pair.damping_ratio * (5.0 / 6.0 * normal_stiffness / pair.inverse_mass).sqrt()
-        } else {
-            0.0
-        };
         ContactCoefficients {
             normal_force,
             normal_energy: 0.4 * normal_force * overlap,
-            normal_damping,
+            normal_damping: pair.dashpot(pair.damping_ratio, 5.0 / 6.0 * normal_stiffness),
             tangential_stiffness,
             tangential_damping_ratio: (tangential_stiffness / normal_stiffness).sqrt(),
         }

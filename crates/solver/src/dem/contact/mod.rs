@@ -1,6 +1,5 @@
 //! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` has the
-//! force laws, `model.rs` the loads of a pair. At set-up, `parameters.rs` selects the law, and
-//! `stiffening.rs` gives the stiffness that an impact needs.
+//! force laws, `model.rs` the loads of a pair. At set-up, `parameters.rs` selects the law.
 //!
 //! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
 //! variant of [`ContactLawKind`], one arm of `ContactParams::force_law`, and its keys in the case
@@ -12,10 +11,9 @@
 mod law;
 mod model;
 mod parameters;
-mod stiffening;
 
-pub(super) use law::{BodyProperties, ContactMaterial, PairProperties};
-pub(super) use model::{ContactModel, Mobility, PairKinematics};
+pub(super) use law::{BodyProperties, PairProperties};
+pub(super) use model::{BodyState, ContactModel, PairKinematics, SubstepVelocity};
 pub use parameters::{ContactLawKind, ContactParams};
 
 use glam::DVec3;
@@ -77,8 +75,6 @@ pub(in crate::dem) struct ContactRecord {
     pub key: PairKey,
     /// Whether the pair was in contact at the last evaluation.
     pub in_contact: bool,
-    /// Whether the pair was in contact at any sub-step of the present step.
-    pub in_contact_during_step: bool,
     /// Deepest overlap at any sub-step of the present step [m]; zero without contact.
     pub deepest_overlap: f64,
     /// Fraction of the dashpot that acts; differs from one just after the contact began.
@@ -104,13 +100,12 @@ impl Clone for ContactRecord {
         copy
     }
     /// Copies a record into the buffers of this one: the trial step copies all records in every
-    /// step. What the search has found is not copied, since the next step starts without it.
+    /// step. What the search has found is not copied, since each step begins without it.
     fn clone_from(&mut self, source: &ContactRecord) {
         let mut history = std::mem::take(&mut self.history);
         history.clone_from(&source.history);
         let next_history = std::mem::take(&mut self.next_history);
-        let mut patch = std::mem::take(&mut self.patch);
-        patch.reset();
+        let patch = std::mem::take(&mut self.patch);
         *self = ContactRecord { history, next_history, patch, ..*source };
     }
 }
@@ -121,7 +116,6 @@ impl ContactRecord {
         ContactRecord {
             key,
             in_contact: false,
-            in_contact_during_step: false,
             deepest_overlap: 0.0,
             dashpot_fraction: 1.0,
             tangential_stiffness: 0.0,
@@ -147,7 +141,6 @@ impl ContactRecord {
     }
     /// Prepares another step: only quantities of the checkpoint may affect it.
     pub fn begin_step(&mut self) {
-        self.in_contact_during_step = false;
         self.deepest_overlap = 0.0;
         self.patch.reset();
     }

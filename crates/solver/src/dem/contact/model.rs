@@ -18,10 +18,10 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::law::{ContactCoefficients, ContactLaw, PairProperties};
+use super::law::{BodyProperties, ContactLaw, PairProperties};
 use super::parameters::ContactParams;
 use super::{ContactRecord, PairLoads, TangentialHistory};
-use crate::dem::search::{ClosestPoint, ContactPoint};
+use crate::dem::search::ContactPoint;
 use crate::math::{Load, RigidVelocity};
 
 /// Exponent p of the overlaps in the weights of a patch. A larger one brings D closer to the
@@ -29,7 +29,7 @@ use crate::math::{Load, RigidVelocity};
 const EXPONENT: i32 = 8;
 
 /// Effective overlap of a patch, and means over its points with the weights w_i.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct PatchMean {
     /// Deepest overlap [m].
     overlap: f64,
@@ -53,22 +53,14 @@ impl PatchMean {
         if overlap <= 0.0 || points.iter().all(|p| p.area <= 0.0) {
             return None;
         }
-        let mut mean = PatchMean {
-            overlap,
-            effective_overlap: 0.0,
-            total: 0.0,
-            gain: 0.0,
-            normal: DVec3::ZERO,
-            lever_arm: DVec3::ZERO,
-            approach: 0.0,
-        };
+        let mut mean = PatchMean { overlap, ..Default::default() };
         for point in points {
             let weight = point.area * (point.overlap / overlap).powi(EXPONENT);
-            let velocity = relative_velocity(&pair.end_of_step, point, pair.branch);
             mean.total += weight;
             mean.effective_overlap += weight * point.overlap;
             mean.normal += weight * point.normal;
             mean.lever_arm += weight * point.lever_arm;
+            let velocity = pair.relative_velocity(point.lever_arm, |v| v.end);
             mean.approach += weight * velocity.dot(point.normal);
         }
         let scale = 1.0 / mean.total;
@@ -95,13 +87,16 @@ impl PatchMean {
 pub(in crate::dem) struct ContactModel {
     /// Parameters.
     pub params: ContactParams,
-    law: Arc<dyn ContactLaw>,
+    /// Force law.
+    pub law: Arc<dyn ContactLaw>,
+    /// Properties of the walls.
+    pub wall: BodyProperties,
 }
 
 impl ContactModel {
     /// Model with these parameters.
     pub fn new(params: ContactParams) -> ContactModel {
-        ContactModel { params, law: params.force_law() }
+        ContactModel { params, law: params.force_law(), wall: params.wall() }
     }
 
     /// Largest gap at which a pair interacts [m], by lubrication; zero without it.
@@ -110,57 +105,42 @@ impl ContactModel {
         if lubrication_viscosity > 0.0 { lubrication_gap.max(0.0) } else { 0.0 }
     }
 
-    /// Duration of an undamped contact [s] that is closing at `speed` [m/s] at `overlap` [m].
-    pub fn contact_time(&self, pair: &PairProperties, speed: f64, overlap: f64) -> f64 {
-        self.law.contact_time(pair, speed, overlap)
-    }
-
     /// Evaluates the loads of a pair with the coefficient `friction` at the end of a sub-step of
     /// `step` [s] into `record.loads` and advances the friction history; a step of zero evaluates
     /// the present state.
     pub fn evaluate(
         &self,
         record: &mut ContactRecord,
-        closest: Option<ClosestPoint>,
-        properties: &PairProperties,
+        closest: Option<ContactPoint>,
         friction: f64,
         pair: &PairKinematics,
         step: f64,
     ) {
+        let [a, b] = &pair.bodies;
+        let properties = PairProperties::new(&a.properties, &b.properties);
         let Some(mean) = PatchMean::of(&record.patch.points, pair) else {
             record.end_contact();
             if let Some(closest) = closest {
-                record.loads = self.lubrication(&closest, properties, pair, step);
+                record.loads = self.lubrication(&closest, &properties, pair, step);
             }
             return;
         };
-        let at = self.law.coefficients(properties, mean.effective_overlap);
+        let at = self.law.coefficients(&properties, mean.effective_overlap);
         let time_in_contact = begin_or_continue(record, &mean, step);
         // A patch of many points is softer than the spring of its law.
         let damping = record.dashpot_fraction * at.normal_damping * mean.gain.clamp(0.0, 1.0);
+        // The tangential force stays as it is when the stiffness grows (loading), and shrinks with
+        // the stiffness when it falls (unloading); otherwise a closed cycle could create energy
+        // (Thornton, Cummins & Cleary 2013).
+        let (before, now) = (record.tangential_stiffness, at.tangential_stiffness);
         let friction = FrictionStep {
             coefficient: friction,
             stiffness: at.tangential_stiffness,
-            history_scale: history_scale(record.tangential_stiffness, at.tangential_stiffness),
+            history_scale: if now > before && before > 0.0 { before / now } else { 1.0 },
             damping: damping * at.tangential_damping_ratio,
             time_in_contact,
             step,
         };
-        self.sum_over_points(record, &mean, &at, damping, &friction, pair);
-        record.tangential_stiffness = at.tangential_stiffness;
-        record.in_contact = true;
-    }
-
-    /// Distributes the pair's force over the penetrating points and sums loads and history.
-    fn sum_over_points(
-        &self,
-        record: &mut ContactRecord,
-        mean: &PatchMean,
-        at: &ContactCoefficients,
-        damping: f64,
-        friction: &FrictionStep,
-        pair: &PairKinematics,
-    ) {
         // Elastic force of the whole pair.
         let elastic_force = (at.normal_force * mean.gain).max(0.0);
         let normal = mean.normal.normalize_or(record.patch.points[0].normal);
@@ -176,10 +156,8 @@ impl ContactModel {
         for point in &record.patch.points {
             let (share, derivative) = mean.weight_and_derivative(point);
             // The local closing speed also damps rocking on a flat face.
-            let approach =
-                relative_velocity(&pair.end_of_step, point, pair.branch).dot(point.normal);
-            let damping =
-                pair.stable_damping(damping, point.lever_arm, point.normal, friction.step);
+            let approach = pair.relative_velocity(point.lever_arm, |v| v.end).dot(point.normal);
+            let damping = pair.stable_damping(damping, point.lever_arm, point.normal, step);
             let normal_force = self.law.normal_force(elastic_force, damping, approach);
             let dashpot_force = share * (normal_force - elastic_force);
             let mut force =
@@ -196,53 +174,45 @@ impl ContactModel {
                 mean_displacement += share * rotate_tangential(displacement, point.normal, normal);
                 loads.elastic_energy +=
                     0.5 * share * friction.stiffness * displacement.length_squared();
-                record.next_history.push(TangentialHistory {
-                    id: point.id,
-                    normal: point.normal,
-                    displacement,
-                });
+                let entry = TangentialHistory { id: point.id, normal: point.normal, displacement };
+                record.next_history.push(entry);
             }
-            loads.on_grain += Load { force, torque: point.lever_arm.cross(force) };
-            loads.on_partner +=
-                Load { force: -force, torque: -(point.lever_arm + pair.branch).cross(force) };
+            let [on_grain, on_partner] = pair.loads(force, point.lever_arm);
+            loads.on_grain += on_grain;
+            loads.on_partner += on_partner;
         }
         std::mem::swap(&mut record.history, &mut record.next_history);
         record.mean_history = TangentialHistory { id: 0, normal, displacement: mean_displacement };
         record.loads = loads;
+        record.tangential_stiffness = at.tangential_stiffness;
+        record.in_contact = true;
     }
 
     /// Leading-order squeeze-film force between the equal-volume spheres,
     /// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
     fn lubrication(
         &self,
-        closest: &ClosestPoint,
+        closest: &ContactPoint,
         properties: &PairProperties,
         pair: &PairKinematics,
         step: f64,
     ) -> PairLoads {
         let (params, range) = (&self.params, self.range());
-        if closest.gap.max(0.0) >= range {
+        let ContactPoint { overlap, lever_arm, normal, .. } = *closest;
+        let gap = -overlap;
+        if gap.max(0.0) >= range {
             return PairLoads::default();
         }
         let strength = 6.0
             * std::f64::consts::PI
             * params.lubrication_viscosity
             * properties.reduced_radius.powi(2);
-        let film = closest.gap.max(params.roughness).min(range);
+        let film = gap.max(params.roughness).min(range);
         let resistance = strength * (1.0 / film - 1.0 / range);
-        let resistance = pair.stable_damping(resistance, closest.lever_arm, closest.normal, step);
-        let lever_arm_b = closest.lever_arm + pair.branch;
-        let [a, b] = &pair.end_of_step;
-        let approach = (a.at(closest.lever_arm) - b.at(lever_arm_b)).dot(closest.normal);
-        let force = -resistance * approach * closest.normal;
-        PairLoads {
-            overlap: -closest.gap,
-            on_grain: Load { force, torque: closest.lever_arm.cross(force) },
-            on_partner: Load { force: -force, torque: -lever_arm_b.cross(force) },
-            lever_arm: closest.lever_arm,
-            normal: closest.normal,
-            elastic_energy: 0.0,
-        }
+        let resistance = pair.stable_damping(resistance, lever_arm, normal, step);
+        let approach = pair.relative_velocity(lever_arm, |v| v.end).dot(normal);
+        let [on_grain, on_partner] = pair.loads(-resistance * approach * normal, lever_arm);
+        PairLoads { overlap, on_grain, on_partner, lever_arm, normal, elastic_energy: 0.0 }
     }
 }
 
@@ -251,63 +221,82 @@ impl ContactModel {
 /// A new contact begins inside the sub-step. Its dashpot force does not start from zero, so only
 /// the part of the sub-step in contact counts.
 fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) -> f64 {
-    let begins = !record.in_contact && mean.approach * step > mean.overlap;
-    let time_in_contact = if begins { mean.overlap / mean.approach } else { step };
-    record.dashpot_fraction = match (begins, step > 0.0 && record.in_contact) {
-        (true, _) => 0.5 + time_in_contact / step,
-        (false, true) => 1.0,
-        // Second evaluation at the same time, or an overlap from the start.
-        (false, false) => record.dashpot_fraction,
-    };
-    time_in_contact
+    if !record.in_contact && mean.approach * step > mean.overlap {
+        let time_in_contact = mean.overlap / mean.approach;
+        record.dashpot_fraction = 0.5 + time_in_contact / step;
+        return time_in_contact;
+    }
+    // A second evaluation at the same time and an overlap from the start keep the fraction.
+    if step > 0.0 && record.in_contact {
+        record.dashpot_fraction = 1.0;
+    }
+    step
 }
 
-/// Factor on the tangential displacement after a change of the tangential stiffness (Thornton,
-/// Cummins & Cleary 2013).
-///
-/// The force stays as it is when the stiffness grows (loading), and shrinks with the stiffness when
-/// it falls (unloading); otherwise a closed cycle could create energy.
-fn history_scale(before: f64, now: f64) -> f64 {
-    if now > before && before > 0.0 { before / now } else { 1.0 }
+/// Velocities of a body in a sub-step, space frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::dem) struct SubstepVelocity {
+    /// v^(n+1/2) and omega^(n+1/2), for the displacement increment (Eqs 12-13).
+    pub middle: RigidVelocity,
+    /// v^(n+1) and omega^(n+1), predicted with the load at n, for the dashpots.
+    pub end: RigidVelocity,
 }
 
-/// Relative position and velocities of the two bodies of a pair, space frame.
+/// Properties, velocities and rotational inertia of a body in a sub-step.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct PairKinematics {
-    /// Branch vector from the centroid of the partner (its image) to that of the first grain [m].
-    pub branch: DVec3,
-    /// Velocities in the middle of the sub-step, for the displacement increment (Eqs 12-13).
-    pub mid_step: [RigidVelocity; 2],
-    /// Velocities expected at the end of the sub-step, for the dashpots.
-    pub end_of_step: [RigidVelocity; 2],
-    /// Mobilities of both bodies.
-    pub mobility: [Mobility; 2],
-}
-
-/// Response of a body to an impulse.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct Mobility {
-    /// Inverse mass, with added mass [1/kg].
-    pub inverse_mass: f64,
+pub(in crate::dem) struct BodyState {
+    /// Mass, radius and elastic constants.
+    pub properties: BodyProperties,
+    /// Velocities, space frame.
+    pub velocity: SubstepVelocity,
     /// Rotation from the body frame to the space frame.
     pub rotation: DMat3,
     /// Principal moments of inertia [kg m^2]; infinite where the rotation is prescribed.
     pub moments: DVec3,
 }
 
-impl Mobility {
-    /// Mobility of a wall.
-    pub const NONE: Mobility =
-        Mobility { inverse_mass: 0.0, rotation: DMat3::IDENTITY, moments: DVec3::INFINITY };
+impl BodyState {
+    /// Body that translates at `velocity` [m/s] and cannot rotate, such as a wall.
+    pub fn translating(properties: BodyProperties, velocity: DVec3) -> BodyState {
+        let velocity = RigidVelocity { linear: velocity, angular: DVec3::ZERO };
+        let velocity = SubstepVelocity { middle: velocity, end: velocity };
+        BodyState { properties, velocity, rotation: DMat3::IDENTITY, moments: DVec3::INFINITY }
+    }
 
     /// Velocity along `direction` per impulse along it, at a point with this lever arm [1/kg].
-    fn along(&self, lever_arm: DVec3, direction: DVec3) -> f64 {
+    fn mobility(&self, lever_arm: DVec3, direction: DVec3) -> f64 {
         let torque = self.rotation.transpose() * lever_arm.cross(direction);
-        self.inverse_mass + torque.dot(torque / self.moments)
+        self.properties.inverse_mass + torque.dot(torque / self.moments)
     }
 }
 
+/// Relative position and states of the two bodies of a pair, space frame.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::dem) struct PairKinematics {
+    /// Branch vector from the centroid of the partner (its image) to that of the first grain [m].
+    pub branch: DVec3,
+    /// First grain and its partner.
+    pub bodies: [BodyState; 2],
+}
+
 impl PairKinematics {
+    /// Velocity of the first body relative to the second at a point (Eq. 12) [m/s]; `of` selects
+    /// the middle or the end of the sub-step.
+    fn relative_velocity(
+        &self,
+        lever_arm: DVec3,
+        of: impl Fn(&SubstepVelocity) -> RigidVelocity,
+    ) -> DVec3 {
+        let [a, b] = &self.bodies;
+        of(&a.velocity).at(lever_arm) - of(&b.velocity).at(lever_arm + self.branch)
+    }
+
+    /// Loads on both bodies of a force [N] on the first one at a point.
+    fn loads(&self, force: DVec3, lever_arm: DVec3) -> [Load; 2] {
+        let on_partner = Load { force: -force, torque: -(lever_arm + self.branch).cross(force) };
+        [Load { force, torque: lever_arm.cross(force) }, on_partner]
+    }
+
     /// Limits the coefficient of a dashpot [N s/m] that acts along the unit vector `direction` at a
     /// point: within a sub-step of `step` [s], an explicit dashpot must not reverse the velocity of
     /// the point, which follows a force at the edge of a flat grain more easily than the centroid.
@@ -315,15 +304,11 @@ impl PairKinematics {
         if damping == 0.0 {
             return 0.0;
         }
-        let [a, b] = &self.mobility;
-        let mobility = a.along(lever_arm, direction) + b.along(lever_arm + self.branch, direction);
+        let [a, b] = &self.bodies;
+        let mobility =
+            a.mobility(lever_arm, direction) + b.mobility(lever_arm + self.branch, direction);
         if step * mobility * damping > 0.5 { 0.5 / (step * mobility) } else { damping }
     }
-}
-
-/// Velocity of the first body relative to the second at a contact point (Eq. 12) [m/s].
-fn relative_velocity(motion: &[RigidVelocity; 2], point: &ContactPoint, branch: DVec3) -> DVec3 {
-    motion[0].at(point.lever_arm) - motion[1].at(point.lever_arm + branch)
 }
 
 /// Quantities of one sub-step that the friction of all points of a patch shares.
@@ -359,17 +344,17 @@ impl FrictionStep {
         let tangential = |v: DVec3| v - v.dot(point.normal) * point.normal;
         let earlier = history.map_or(DVec3::ZERO, |history| {
             // The spring turns with the mean spin of the pair about the normal.
-            let spin = pair.mid_step[0].angular + pair.mid_step[1].angular;
+            let [a, b] = &pair.bodies;
+            let spin = a.velocity.middle.angular + b.velocity.middle.angular;
             let twist = 0.5 * self.step * spin.dot(point.normal);
             let displacement = self.history_scale * history.displacement;
             DQuat::from_axis_angle(point.normal, twist)
                 * rotate_tangential(displacement, history.normal, point.normal)
         });
         // Eq. 13 with the relative velocity of Eq. 12 at the middle of the sub-step.
-        let velocity = relative_velocity(&pair.mid_step, point, pair.branch);
+        let velocity = pair.relative_velocity(point.lever_arm, |v| v.middle);
         let displacement = earlier + self.time_in_contact * tangential(velocity);
-        let sliding = relative_velocity(&pair.end_of_step, point, pair.branch);
-        let sliding = tangential(sliding);
+        let sliding = tangential(pair.relative_velocity(point.lever_arm, |v| v.end));
         let direction = sliding.normalize_or_zero();
         let damping = pair.stable_damping(self.damping, point.lever_arm, direction, self.step);
         let viscous = damping * sliding;

@@ -5,11 +5,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{
-    BodyProperties, ContactLaw, ContactMaterial, HertzMindlin, Linear, PairProperties,
-};
+use super::law::{BodyProperties, ContactLaw, HertzMindlin, Linear, PairProperties};
 use crate::dem::grain::Grain;
-use crate::dem::material::{MIN_RESTITUTION, Material, damping_ratio};
+use crate::dem::material::Material;
 
 /// Force laws of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,7 +83,7 @@ impl Default for ContactParams {
 
 impl ContactParams {
     /// Restitution below which the dashpot grows no further.
-    pub const MIN_RESTITUTION: f64 = MIN_RESTITUTION;
+    pub const MIN_RESTITUTION: f64 = 0.05;
 
     /// Damping ratio of the linear law, c / (2 sqrt(k m)), that gives `restitution`.
     pub fn damping_ratio(&self) -> f64 {
@@ -111,51 +109,155 @@ impl ContactParams {
         }
     }
 
+    /// Properties of the walls.
+    pub(super) fn wall(&self) -> BodyProperties {
+        BodyProperties::new(&self.wall_material, 0.0, f64::INFINITY)
+    }
+
     /// Duration of an undamped impact at `speed` [m/s] between two grains equal to `grain` [s].
     pub fn contact_time(&self, grain: &Grain, speed: f64) -> f64 {
         let body = BodyProperties::of(grain);
-        let pair = PairProperties::new(&body, Some(&body), &ContactMaterial::default());
-        self.force_law().contact_time(&pair, speed, 0.0)
+        self.force_law().contact_time(&PairProperties::new(&body, &body), speed, 0.0)
     }
 
     /// Largest overlap of an undamped impact of `grain` on a wall at `speed` [m/s], without added
     /// mass [m].
     pub fn impact_overlap(&self, grain: &Grain, speed: f64) -> f64 {
-        let wall = ContactMaterial::new(&self.wall_material);
-        let pair = PairProperties::new(&BodyProperties::of(grain), None, &wall);
+        let pair = PairProperties::new(&BodyProperties::of(grain), &self.wall());
         self.force_law().impact_overlap(&pair, speed)
     }
-}
 
-impl ContactMaterial {
-    /// Constants of a material.
-    pub fn new(material: &Material) -> ContactMaterial {
-        ContactMaterial {
-            normal_compliance: material.normal_compliance(),
-            tangential_compliance: material.tangential_compliance(),
-            damping_ratio: damping_ratio(material.restitution),
-        }
+    /// Returns the factor on the stiffness (linear law) or on Young's modulus (Hertz-Mindlin) at
+    /// which a pair that is closing at `speed` [m/s] with the overlap `now` [m] would overlap by at
+    /// most `wanted` [m].
+    ///
+    /// The energy of the spring and of the approach is that of an impact at a higher speed. A
+    /// partner of `None` is a wall.
+    pub fn stiffening(
+        &self,
+        grain: &Grain,
+        partner: Option<&Grain>,
+        speed: f64,
+        now: f64,
+        wanted: f64,
+    ) -> f64 {
+        let body = |grain: &Grain| BodyProperties {
+            inverse_mass: grain.inverse_mass(self.added_density),
+            ..BodyProperties::of(grain)
+        };
+        let pair = PairProperties::new(&body(grain), &partner.map_or(self.wall(), body));
+        // Overlap ~ speed^n and stiffness^(-n / 2).
+        let n = match self.law {
+            ContactLawKind::Linear => 1.0,
+            ContactLawKind::HertzMindlin => 0.8,
+        };
+        let law = self.force_law();
+        let of_speed = |speed: f64| law.impact_overlap(&pair, speed);
+        let stored = (now / of_speed(1.0)).powf(1.0 / n);
+        let overlap = of_speed(stored.hypot(speed));
+        (overlap / wanted).powf(2.0 / n)
     }
 }
 
 impl BodyProperties {
+    /// Properties of a body of `material`.
+    fn new(material: &Material, inverse_mass: f64, radius: f64) -> BodyProperties {
+        let Material { youngs_modulus, poisson_ratio: nu, restitution } = *material;
+        BodyProperties {
+            inverse_mass,
+            radius,
+            normal_compliance: (1.0 - nu * nu) / youngs_modulus,
+            tangential_compliance: 2.0 * (2.0 - nu) * (1.0 + nu) / youngs_modulus,
+            damping_ratio: damping_ratio(restitution),
+        }
+    }
+
     /// Properties of a grain without added mass, as if it moved freely.
     pub fn of(grain: &Grain) -> BodyProperties {
-        BodyProperties {
-            inverse_mass: 1.0 / grain.mass(),
-            radius: 0.5 * grain.shape.equivalent_diameter(),
-            material: ContactMaterial::new(&grain.material),
+        let radius = 0.5 * grain.shape.equivalent_diameter();
+        BodyProperties::new(&grain.material, 1.0 / grain.mass(), radius)
+    }
+}
+
+/// Damping ratio zeta = c / (2 sqrt(k m)) of a spring and dashpot that give the coefficient of
+/// restitution e if the contact ends where its force vanishes (Schwager & Poeschel 2007).
+///
+/// A dry contact cannot pull. With zeta = sin(theta), e = exp(-tan(theta) (pi - 2 theta)); with
+/// zeta = cosh(u), e = exp(-2 u / tanh(u)).
+fn damping_ratio(restitution: f64) -> f64 {
+    let log_loss = -restitution.clamp(ContactParams::MIN_RESTITUTION, 1.0).ln();
+    if log_loss == 0.0 {
+        return 0.0;
+    }
+    let bisect = |mut low: f64, mut high: f64, exponent: &dyn Fn(f64) -> f64| {
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if exponent(middle) < log_loss { low = middle } else { high = middle }
         }
+        0.5 * (low + high)
+    };
+    let pi = std::f64::consts::PI;
+    if log_loss < 2.0 {
+        bisect(0.0, 0.5 * pi - 1e-9, &|theta| theta.tan() * (pi - 2.0 * theta)).sin()
+    } else {
+        bisect(1e-9, 20.0, &|u| 2.0 * u / u.tanh()).cosh()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use grainwake_shape::ShapeOptions;
+    use grainwake_shape::analytic::sphere;
+
     use super::*;
 
     #[test]
     fn stiffness_for_overlap_inverts_the_energy_balance() {
         let k = ContactParams::stiffness_for_overlap(2.0, 3.0, 1e-3);
         assert!((0.5 * k * 1e-6 - 0.5 * 2.0 * 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_stiffened_contact_has_the_wanted_overlap() {
+        let material = Material { youngs_modulus: 1e6, poisson_ratio: 0.3, restitution: 1.0 };
+        let shape = sphere(1e-3, &ShapeOptions::default()).unwrap();
+        let grain = Grain::new(shape, 2500.0).with_material(material);
+        for law in [ContactLawKind::Linear, ContactLawKind::HertzMindlin] {
+            let soft = ContactParams { law, normal_stiffness: 10.0, ..Default::default() };
+            let full = soft.impact_overlap(&grain, 0.1);
+            // All energy is that of the approach, then all is that of the spring.
+            for (speed, now) in [(0.1, 0.0), (0.0, full)] {
+                let factor = soft.stiffening(&grain, None, speed, now, 0.1 * full);
+                let mut stiff = (soft, grain.clone());
+                stiff.0.normal_stiffness *= factor;
+                stiff.1.material.youngs_modulus *= factor;
+                let reached = stiff.0.impact_overlap(&stiff.1, 0.1) / full;
+                assert!((reached - 0.1).abs() < 1e-9, "{law:?}, {speed} m/s: {reached}");
+            }
+        }
+    }
+
+    /// Rebound speed of a unit oscillator with dashpot, released where the force vanishes.
+    fn rebound(zeta: f64) -> f64 {
+        let (mut x, mut v, dt) = (0.0f64, 1.0f64, 1e-5);
+        loop {
+            let a = -x - 2.0 * zeta * v;
+            let (xm, vm) = (x + 0.5 * dt * v, v + 0.5 * dt * a);
+            let am = -xm - 2.0 * zeta * vm;
+            x += dt * vm;
+            v += dt * am;
+            if x + 2.0 * zeta * v <= 0.0 {
+                return -v;
+            }
+        }
+    }
+
+    #[test]
+    fn damping_ratio_gives_the_restitution_of_a_contact_that_cannot_pull() {
+        for restitution in [0.97, 0.9, 0.5, 0.2, 0.08] {
+            let measured = rebound(damping_ratio(restitution));
+            assert!((measured - restitution).abs() < 1e-4, "{restitution}: {measured}");
+        }
+        assert_eq!(damping_ratio(1.0), 0.0);
     }
 }

@@ -3,124 +3,80 @@
 //! v^(n+1/2) = v^n + dt/2 (F^n/m - xi v^n), x^(n+1) = x^n + dt v^(n+1/2) and v^(n+1) = (v^(n+1/2) +
 //! dt/2 F^(n+1)/m) / (1 + xi dt/2) are Eqs 21-23 split at integer times; the two half steps in
 //! sequence give Eq. 22. The mass is that of the grain, or the 6 x 6 mass of grain and fluid
-//! ([`GrainResponse`]).
+//! ([`GrainResponse`](super::GrainResponse)).
 
 use glam::DVec3;
 
+use super::contact_body::ContactBody;
 use super::rotation::{half_step_explicit, half_step_implicit, rotate_by_cayley, rotate_exactly};
+use crate::dem::contact::SubstepVelocity;
 use crate::dem::grain::{Grain, MotionConstraint};
-use crate::math::{Load, Matrix6, RigidVelocity, Vector6};
+use crate::math::{Load, RigidVelocity};
 
-/// Velocities in a sub-step, space frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct HalfStepVelocity {
-    /// v^(n+1/2) and omega^(n+1/2).
-    pub middle: RigidVelocity,
-    /// v^(n+1) and omega^(n+1), predicted with the load at n.
-    pub end: RigidVelocity,
-}
-
-/// Inertia against a load.
-#[derive(Clone, Copy)]
-pub(super) enum EffectiveInertia<'a> {
-    /// Inverse mass [1/kg], and the grain's own moments of inertia.
-    Grain(f64),
-    /// Response with the fluid; the load is the contact load only.
-    WithFluid(&'a GrainResponse),
-}
-
-impl EffectiveInertia<'_> {
-    /// Acceleration of the centroid under `load` [m/s^2].
+impl ContactBody {
+    /// Acceleration of the centroid under `load` [m/s^2]. Added mass counts only in a contact.
     fn acceleration(&self, load: &Load) -> DVec3 {
-        match self {
-            EffectiveInertia::Grain(inverse_mass) => load.force * *inverse_mass,
-            EffectiveInertia::WithFluid(response) => response.acceleration(load)[0],
+        match &self.response {
+            Some(response) => response.acceleration(load)[0],
+            None if self.contact.force == DVec3::ZERO => load.force * self.own_inverse_mass,
+            None => load.force * self.state.properties.inverse_mass,
         }
     }
-}
 
-/// First half step: velocities to n+1/2 and pose to n+1.
-pub(super) fn first_half_step(
-    grain: &mut Grain,
-    load: &Load,
-    inertia: EffectiveInertia,
-    damping: f64,
-    step: f64,
-) -> HalfStepVelocity {
-    let half = 0.5 * step;
-    let HalfStepVelocity { mut middle, mut end } = HalfStepVelocity::default();
-    match grain.translation {
-        MotionConstraint::Free => {
-            let change = half * (inertia.acceleration(load) - damping * grain.velocity);
-            middle.linear = grain.velocity + change;
+    /// First half step of the body's grain: velocities to n+1/2 and pose to n+1.
+    pub fn first_half_step(&mut self, grain: &mut Grain, damping: f64, step: f64) {
+        let (load, half) = (self.load + self.contact, 0.5 * step);
+        let start = grain.rigid_velocity();
+        let (mut middle, mut end) = (start, start);
+        if grain.translation == MotionConstraint::Free {
+            let change = half * (self.acceleration(&load) - damping * start.linear);
+            middle.linear = start.linear + change;
             end.linear = middle.linear + change;
         }
-        MotionConstraint::Prescribed(velocity) => {
-            grain.velocity = velocity;
-            middle.linear = velocity;
-            end.linear = velocity;
-        }
-    }
-    grain.pose.position += step * middle.linear;
-    match grain.rotation {
-        MotionConstraint::Free => {
+        grain.pose.position += step * middle.linear;
+        if grain.rotation == MotionConstraint::Free {
             let to_body = grain.pose.orientation.conjugate();
-            let omega = to_body * grain.angular_velocity;
-            let omega_mid = match inertia {
-                EffectiveInertia::Grain(_) => {
+            let omega = to_body * start.angular;
+            let omega_mid = match &self.response {
+                None => {
                     let torque = to_body * load.torque;
                     half_step_explicit(grain.principal_inertia(), omega, torque, damping, half)
                 }
-                EffectiveInertia::WithFluid(response) => {
-                    omega + half * (to_body * response.acceleration(load)[1] - damping * omega)
+                Some(response) => {
+                    omega + half * (to_body * response.acceleration(&load)[1] - damping * omega)
                 }
             };
             grain.pose.orientation = rotate_by_cayley(grain.pose.orientation, omega_mid, step);
             // The rotation axis is omega_mid, so its space components do not change.
             middle.angular = grain.pose.orientation * omega_mid;
-            end.angular = 2.0 * middle.angular - grain.angular_velocity;
+            end.angular = 2.0 * middle.angular - start.angular;
+        } else {
+            grain.pose.orientation = rotate_exactly(grain.pose.orientation, start.angular, step);
         }
-        MotionConstraint::Prescribed(omega) => {
-            grain.angular_velocity = omega;
-            grain.pose.orientation = rotate_exactly(grain.pose.orientation, omega, step);
-            middle.angular = omega;
-            end.angular = omega;
-        }
+        self.velocity = SubstepVelocity { middle, end };
     }
-    HalfStepVelocity { middle, end }
-}
 
-/// Second half step, with the load at n+1: velocities to n+1.
-pub(super) fn second_half_step(
-    grain: &mut Grain,
-    middle: RigidVelocity,
-    load: &Load,
-    inertia: EffectiveInertia,
-    damping: f64,
-    step: f64,
-) {
-    let half = 0.5 * step;
-    let damping_factor = 1.0 + damping * half;
-    if grain.translation == MotionConstraint::Free {
-        grain.velocity = (middle.linear + half * inertia.acceleration(load)) / damping_factor;
-    }
-    if grain.rotation == MotionConstraint::Free {
-        grain.angular_velocity = match inertia {
-            EffectiveInertia::Grain(_) => {
-                let to_body = grain.pose.orientation.conjugate();
-                let omega = half_step_implicit(
-                    grain.principal_inertia(),
-                    to_body * middle.angular,
-                    to_body * load.torque,
-                    damping,
-                    half,
-                );
-                grain.pose.orientation * omega
-            }
-            EffectiveInertia::WithFluid(response) => {
-                (middle.angular + half * response.acceleration(load)[1]) / damping_factor
-            }
-        };
+    /// Second half step of the body's grain, with the load at n+1: velocities to n+1.
+    pub fn second_half_step(&self, grain: &mut Grain, damping: f64, step: f64) {
+        let (load, half, middle) = (self.load + self.contact, 0.5 * step, self.velocity.middle);
+        let damping_factor = 1.0 + damping * half;
+        if grain.translation == MotionConstraint::Free {
+            grain.velocity = (middle.linear + half * self.acceleration(&load)) / damping_factor;
+        }
+        if grain.rotation == MotionConstraint::Free {
+            grain.angular_velocity = match &self.response {
+                None => {
+                    let to_body = grain.pose.orientation.conjugate();
+                    let (omega, torque) = (to_body * middle.angular, to_body * load.torque);
+                    let inertia = grain.principal_inertia();
+                    let omega = half_step_implicit(inertia, omega, torque, damping, half);
+                    grain.pose.orientation * omega
+                }
+                Some(response) => {
+                    (middle.angular + half * response.acceleration(&load)[1]) / damping_factor
+                }
+            };
+        }
     }
 }
 
@@ -132,62 +88,7 @@ pub(super) fn move_at_constant_acceleration(
     dt: f64,
 ) {
     let free = (from + to) / 2.0;
-    let of = |constraint: MotionConstraint, free: DVec3| match constraint {
-        MotionConstraint::Free => free,
-        MotionConstraint::Prescribed(velocity) => velocity,
-    };
-    grain.pose.position += dt * of(grain.translation, free.linear);
-    let omega = of(grain.rotation, free.angular);
+    grain.pose.position += dt * grain.translation.velocity(free.linear);
+    let omega = grain.rotation.velocity(free.angular);
     grain.pose.orientation = rotate_exactly(grain.pose.orientation, omega, dt);
-}
-
-/// Acceleration of a grain in a fluid as an affine function of the contact load, over one step.
-#[derive(Clone, Copy, Debug)]
-pub struct GrainResponse {
-    /// Velocities at the start, space frame.
-    pub(super) start: RigidVelocity,
-    /// Velocities at the end if no contact acts; only in the step after a contact, whose trial step
-    /// begins with other velocities.
-    pub(super) end_without_contact: Option<RigidVelocity>,
-    /// Acceleration [m/s^2] and angular acceleration [rad/s^2] without contact, space frame.
-    free: [DVec3; 2],
-    /// Columns of the inverse 6 x 6 mass of grain and entrained fluid: accelerations under a unit
-    /// force along x, y, z and a unit torque about x, y, z.
-    inverse: Matrix6,
-}
-
-impl GrainResponse {
-    /// Response from the velocities at the start, the loads without contact [N] and [N m], and the
-    /// columns of the inverse 6 x 6 mass.
-    pub fn new(start: RigidVelocity, load: Vector6, inverse: Matrix6) -> GrainResponse {
-        let free = Default::default();
-        let mut response = GrainResponse { start, end_without_contact: None, free, inverse };
-        response.free = response.acceleration(&Load {
-            force: DVec3::from_slice(&load[..3]),
-            torque: DVec3::from_slice(&load[3..]),
-        });
-        response
-    }
-
-    /// Response in the step after a contact, with the velocities at the end if no contact acts.
-    pub fn after_contact(self, end: RigidVelocity) -> GrainResponse {
-        GrainResponse { end_without_contact: Some(end), ..self }
-    }
-
-    /// Acceleration [m/s^2] and angular acceleration [rad/s^2] under a contact load.
-    pub(super) fn acceleration(&self, contact: &Load) -> [DVec3; 2] {
-        let mut sum = self.free;
-        let loads = [contact.force, contact.torque];
-        for (n, column) in self.inverse.iter().enumerate() {
-            let load = loads[n / 3][n % 3];
-            sum[0] += load * DVec3::from_slice(&column[..3]);
-            sum[1] += load * DVec3::from_slice(&column[3..]);
-        }
-        sum
-    }
-
-    /// Inverse of the mass against a force, averaged over directions [1/kg].
-    pub(super) fn inverse_mass(&self) -> f64 {
-        (self.inverse[0][0] + self.inverse[1][1] + self.inverse[2][2]) / 3.0
-    }
 }

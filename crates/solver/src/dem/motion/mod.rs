@@ -2,8 +2,8 @@
 //! a trial step that is accepted or repeated with the response of the fluid
 //! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 //!
-//! `substeps.rs` has the contact sub-steps, `contact_body.rs` the evaluation of one pair,
-//! `integrator.rs` and `rotation.rs` the motion of one grain, `checkpoint.rs` the stored state.
+//! `substeps.rs` has the contact sub-steps, `contact_body.rs` the state of one grain in them,
+//! `integrator.rs` and `rotation.rs` its motion, `checkpoint.rs` the stored state.
 
 mod checkpoint;
 mod contact_body;
@@ -11,14 +11,14 @@ mod integrator;
 pub mod rotation;
 mod substeps;
 
-pub use integrator::GrainResponse;
+pub use contact_body::GrainResponse;
 use integrator::move_at_constant_acceleration;
 
 use glam::{DVec3, IVec3};
 
-use super::contact::{Contact, ContactMaterial, ContactModel, ContactParams, ContactRecord};
+use super::contact::{Contact, ContactModel, ContactParams, ContactRecord};
 use super::enclosure::{Enclosure, Partner};
-use super::grain::{Grain, MotionConstraint};
+use super::grain::Grain;
 use super::search::{BoundingSphere, BroadPhase};
 use crate::math::{Load, Pose, RigidVelocity};
 use contact_body::ContactBody;
@@ -27,7 +27,6 @@ use contact_body::ContactBody;
 #[derive(Clone, Debug)]
 pub struct ContactDynamics {
     model: ContactModel,
-    wall: ContactMaterial,
     enclosure: Enclosure,
     contacts: Vec<Contact>,
     /// Deepest overlap of the last step relative to the smaller equivalent diameter.
@@ -41,7 +40,15 @@ pub struct ContactDynamics {
     bodies: Vec<ContactBody>,
     broad_phase: BroadPhase,
     spheres: Vec<BoundingSphere>,
-    state_before: StateBefore,
+    before: StateBefore,
+}
+
+/// Contact history and poses before the last trial step, in buffers that are kept between steps.
+#[derive(Clone, Debug, Default)]
+struct StateBefore {
+    records: Vec<ContactRecord>,
+    last_positions: Vec<DVec3>,
+    poses: Vec<Pose>,
 }
 
 impl ContactDynamics {
@@ -50,7 +57,6 @@ impl ContactDynamics {
     pub fn new(params: ContactParams, enclosure: Enclosure) -> ContactDynamics {
         ContactDynamics {
             model: ContactModel::new(params),
-            wall: ContactMaterial::new(&params.wall_material),
             enclosure,
             contacts: Vec::new(),
             largest_overlap: None,
@@ -60,7 +66,7 @@ impl ContactDynamics {
             bodies: Vec::new(),
             broad_phase: BroadPhase::default(),
             spheres: Vec::new(),
-            state_before: StateBefore::default(),
+            before: StateBefore::default(),
         }
     }
     /// Contacts of the last step, ordered by grain, then partner.
@@ -108,25 +114,27 @@ impl ContactDynamics {
         if dt.is_nan() || dt <= 0.0 {
             return 0;
         }
-        self.begin_step(grains);
-        self.bodies.iter_mut().for_each(|body| body.response = None);
-        self.substeps = self.integrate(grains, loads, dt, mean_contact);
+        self.begin_step(grains, loads, &[]);
+        self.integrate(grains, dt);
+        for (mean, body) in mean_contact.iter_mut().zip(&self.bodies) {
+            *mean = body.mean_contact;
+        }
         self.end_step(grains);
         self.substeps
     }
 
     /// Applies prescribed velocities, updates the contact bodies, and renumbers the periodic image
     /// of a pair if one of its grains was wrapped into the box since the last step.
-    fn begin_step(&mut self, grains: &mut [Grain]) {
+    fn begin_step(&mut self, grains: &mut [Grain], loads: &[Load], responses: &[GrainResponse]) {
         for grain in grains.iter_mut() {
-            if let MotionConstraint::Prescribed(velocity) = grain.translation {
-                grain.velocity = velocity;
-            }
-            if let MotionConstraint::Prescribed(omega) = grain.rotation {
-                grain.angular_velocity = omega;
-            }
+            grain.velocity = grain.translation.velocity(grain.velocity);
+            grain.angular_velocity = grain.rotation.velocity(grain.angular_velocity);
         }
         ContactBody::synchronise(&mut self.bodies, grains);
+        for (i, (grain, body)) in grains.iter().zip(&mut self.bodies).enumerate() {
+            let load = loads.get(i).copied().unwrap_or_default();
+            body.begin_step(grain, load, responses.get(i).copied());
+        }
         let (last, enclosure) = (&self.last_positions, &self.enclosure);
         let periods_moved = |i: usize| match (last.get(i), grains.get(i)) {
             (Some(last), Some(grain)) => enclosure.periods(grain.pose.position - *last, f64::round),
@@ -153,7 +161,7 @@ impl ContactDynamics {
         self.last_positions.extend(grains.iter().map(|grain| grain.pose.position));
         self.contacts.clear();
         self.largest_overlap = None;
-        for record in self.records.iter().filter(|r| r.in_contact_during_step) {
+        for record in self.records.iter().filter(|record| record.deepest_overlap > 0.0) {
             let grain = record.key.grain as usize;
             let overlap =
                 RelativeOverlap::of(grains, grain, record.key.partner, record.deepest_overlap);
@@ -189,22 +197,18 @@ impl RelativeOverlap {
     /// Relates the overlap `depth` [m] of a pair to the diameters of its grains.
     pub fn of(grains: &[Grain], grain: usize, partner: Partner, depth: f64) -> RelativeOverlap {
         let diameter = |index: usize| grains[index].shape.equivalent_diameter();
-        let smaller = match partner {
-            Partner::Grain(other) => diameter(grain).min(diameter(other)),
-            Partner::Wall { .. } => diameter(grain),
-        };
+        let smaller = partner.grain().map_or(f64::INFINITY, diameter).min(diameter(grain));
         RelativeOverlap { grain, partner, depth, relative: depth / smaller }
     }
 }
 
-/// Step that [`ContactDynamics::trial_step`] has taken, with the state from before it.
+/// Step that [`ContactDynamics::trial_step`] has taken.
 ///
 /// Either [`ContactDynamics::accept`] or [`ContactDynamics::resolve_with_response`] consumes it.
 #[must_use = "accept the step or resolve it with the response of the fluid"]
 #[derive(Debug)]
 pub struct TrialStep {
     dt: f64,
-    before: StateBefore,
 }
 
 impl ContactDynamics {
@@ -216,20 +220,16 @@ impl ContactDynamics {
         dt: f64,
         mean_contact: &mut [Load],
     ) -> TrialStep {
-        // The buffers return with the accepted or resolved step.
-        let mut before = std::mem::take(&mut self.state_before);
-        before.records.clone_from(&self.records);
-        before.last_positions.clone_from(&self.last_positions);
-        before.poses.clear();
-        before.poses.extend(grains.iter().map(|grain| grain.pose));
+        self.before.records.clone_from(&self.records);
+        self.before.last_positions.clone_from(&self.last_positions);
+        self.before.poses.clear();
+        self.before.poses.extend(grains.iter().map(|grain| grain.pose));
         self.advance(grains, loads, dt, mean_contact);
-        TrialStep { dt, before }
+        TrialStep { dt }
     }
 
     /// Accepts a trial step as it is.
-    pub fn accept(&mut self, trial: TrialStep) {
-        self.state_before = trial.before;
-    }
+    pub fn accept(&mut self, _trial: TrialStep) {}
 
     /// Repeats a trial step from its start, with the response of the fluid of this step to contact.
     ///
@@ -246,43 +246,35 @@ impl ContactDynamics {
         mean_contact: &mut [Load],
         ends: &mut [RigidState],
     ) {
-        let TrialStep { dt, mut before } = trial;
-        before.trial_ends.clear();
-        let trial_ends = grains.iter().zip(&*mean_contact);
-        (before.trial_ends).extend(trial_ends.map(|(grain, load)| TrialEnd {
-            state: RigidState::of(grain),
-            touched: !load.is_zero(),
-        }));
-        mean_contact.fill(Load::default());
-        self.records.clone_from(&before.records);
-        self.last_positions.clone_from(&before.last_positions);
-        let starts = before.poses.iter().zip(responses);
+        for (end, grain) in ends.iter_mut().zip(&*grains) {
+            *end = RigidState::of(grain);
+        }
+        self.records.clone_from(&self.before.records);
+        self.last_positions.clone_from(&self.before.last_positions);
+        let starts = self.before.poses.iter().zip(responses);
         for (grain, (pose, response)) in grains.iter_mut().zip(starts) {
             RigidState { pose: *pose, velocity: response.start }.apply_to(grain);
         }
-        self.begin_step(grains);
-        for (body, response) in self.bodies.iter_mut().zip(responses) {
-            body.response = Some(*response);
-        }
         // The responses contain all other loads.
-        self.substeps = self.integrate(grains, &[], dt, mean_contact);
+        self.begin_step(grains, &[], responses);
+        self.integrate(grains, trial.dt);
         for (n, grain) in grains.iter_mut().enumerate() {
-            let trial_end = &before.trial_ends[n];
+            let touched_in_trial = !mean_contact[n].is_zero();
+            mean_contact[n] = self.bodies[n].mean_contact;
             if mean_contact[n].is_zero() {
                 if let Some(end) = responses[n].end_without_contact {
-                    grain.pose = before.poses[n];
-                    move_at_constant_acceleration(grain, [responses[n].start, end], dt);
-                } else if !trial_end.touched {
-                    grain.pose = trial_end.state.pose;
+                    grain.pose = self.before.poses[n];
+                    move_at_constant_acceleration(grain, [responses[n].start, end], trial.dt);
+                } else if !touched_in_trial {
+                    grain.pose = ends[n].pose;
                 }
             }
-            ends[n] = RigidState::of(grain);
         }
         self.end_step(grains);
-        for (grain, trial_end) in grains.iter_mut().zip(&before.trial_ends) {
-            trial_end.state.apply_to(grain);
+        for (grain, end) in grains.iter_mut().zip(ends) {
+            let trial_end = std::mem::replace(end, RigidState::of(grain));
+            trial_end.apply_to(grain);
         }
-        self.state_before = before;
     }
 }
 
@@ -307,23 +299,4 @@ impl RigidState {
         grain.velocity = self.velocity.linear;
         grain.angular_velocity = self.velocity.angular;
     }
-}
-
-/// Contact history and poses before a trial step, and the states after it. [`ContactDynamics`]
-/// keeps the buffers between steps.
-#[derive(Clone, Debug, Default)]
-struct StateBefore {
-    records: Vec<ContactRecord>,
-    last_positions: Vec<DVec3>,
-    poses: Vec<Pose>,
-    /// End of the trial step; filled while the step is resolved with the response of the fluid.
-    trial_ends: Vec<TrialEnd>,
-}
-
-/// End of a trial step for one grain.
-#[derive(Clone, Copy, Debug)]
-struct TrialEnd {
-    state: RigidState,
-    /// Whether a contact or lubrication load acted on the grain.
-    touched: bool,
 }

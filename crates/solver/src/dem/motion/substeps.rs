@@ -1,15 +1,19 @@
 //! Contact sub-steps of one step: pair list, number of sub-steps, contact loads and integration.
 
+use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
 use super::ContactDynamics;
-use super::contact_body::{PairContext, evaluate_pair, pair_properties};
-use super::integrator::{first_half_step, second_half_step};
-use crate::dem::contact::{ContactRecord, update_records};
-use crate::dem::enclosure::{PairKey, Partner};
+use super::contact_body::ContactBody;
+use crate::dem::contact::{
+    BodyState, ContactParams, ContactRecord, PairKinematics, PairProperties, update_records,
+};
+use crate::dem::enclosure::{PairKey, Partner, Side};
 use crate::dem::grain::{Grain, MotionConstraint};
 use crate::dem::search::BoundingSphere;
-use crate::math::Load;
+
+/// Safety factor on the motion that reduces the known separation of a pair.
+const MOTION_MARGIN: f64 = 1.01;
 
 /// Skin of the pair list: displacement that is always allowed before the next search
 /// [bounding radii].
@@ -20,32 +24,20 @@ const PARALLEL_PAIRS: usize = 16;
 const MAX_SUBSTEPS: f64 = 1e7;
 
 impl ContactDynamics {
-    /// Integrates poses and velocities over `dt` [s]; returns the number of sub-steps.
-    pub(super) fn integrate(
-        &mut self,
-        grains: &mut [Grain],
-        loads: &[Load],
-        dt: f64,
-        mean_contact: &mut [Load],
-    ) -> usize {
-        self.search_pairs(grains, loads, dt);
-        if self.records.len() < PARALLEL_PAIRS {
-            self.run_substeps(grains, loads, dt, mean_contact)
+    /// Integrates poses and velocities over `dt` [s].
+    pub(super) fn integrate(&mut self, grains: &mut [Grain], dt: f64) {
+        self.search_pairs(grains, dt);
+        self.substeps = if self.records.len() < PARALLEL_PAIRS {
+            self.run_substeps(grains, dt)
         } else {
             // The thread pool is entered once per step. A caller outside the pool would otherwise
             // wait for a worker thread at every sub-step.
-            rayon::scope(|_| self.run_substeps(grains, loads, dt, mean_contact))
-        }
+            rayon::scope(|_| self.run_substeps(grains, dt))
+        };
     }
 
-    fn run_substeps(
-        &mut self,
-        grains: &mut [Grain],
-        loads: &[Load],
-        dt: f64,
-        mean_contact: &mut [Load],
-    ) -> usize {
-        let load_of = |i: usize| loads.get(i).copied().unwrap_or_default();
+    /// Returns the number of sub-steps.
+    fn run_substeps(&mut self, grains: &mut [Grain], dt: f64) -> usize {
         let damping = self.model.params.global_damping;
         self.compute_contacts(grains, 0.0);
         let (mut done, mut time_left) = (0, dt);
@@ -53,30 +45,23 @@ impl ContactDynamics {
         while substeps_left > 0 {
             let step = time_left / substeps_left as f64;
             let half_mean = 0.5 * step / dt;
-            for (i, (grain, body)) in grains.iter_mut().zip(&mut self.bodies).enumerate() {
-                if let Some(mean) = mean_contact.get_mut(i) {
-                    *mean += body.contact * half_mean;
-                }
-                let load = load_of(i) + body.contact;
-                body.half_step = first_half_step(grain, &load, body.inertia(), damping, step);
+            for (grain, body) in grains.iter_mut().zip(&mut self.bodies) {
+                body.mean_contact += body.contact * half_mean;
+                body.first_half_step(grain, damping, step);
             }
             substeps_left -= 1;
             done += 1;
             time_left -= step;
             if self.pair_list_expired(grains) {
-                self.search_pairs(grains, loads, time_left.max(step));
+                self.search_pairs(grains, time_left.max(step));
                 if substeps_left > 0 {
                     substeps_left = self.substeps_for(time_left);
                 }
             }
             self.compute_contacts(grains, step);
-            for (i, (grain, body)) in grains.iter_mut().zip(&self.bodies).enumerate() {
-                if let Some(mean) = mean_contact.get_mut(i) {
-                    *mean += body.contact * half_mean;
-                }
-                let load = load_of(i) + body.contact;
-                let inertia = body.inertia();
-                second_half_step(grain, body.half_step.middle, &load, inertia, damping, step);
+            for (grain, body) in grains.iter_mut().zip(&mut self.bodies) {
+                body.mean_contact += body.contact * half_mean;
+                body.second_half_step(grain, damping, step);
             }
         }
         done
@@ -86,17 +71,17 @@ impl ContactDynamics {
     ///
     /// A bounding sphere grows by the displacement of its grain under the present loads and a skin
     /// (Verlet list).
-    fn search_pairs(&mut self, grains: &[Grain], loads: &[Load], dt: f64) {
+    fn search_pairs(&mut self, grains: &[Grain], dt: f64) {
         self.spheres.clear();
         let reach = 0.5 * self.model.range();
-        for (i, (grain, body)) in grains.iter().zip(&mut self.bodies).enumerate() {
-            let load = loads.get(i).copied().unwrap_or_default() + body.contact;
+        for (grain, body) in grains.iter().zip(&mut self.bodies) {
+            let load = body.load + body.contact;
             body.own_inverse_mass = grain.inverse_mass(0.0);
             let acceleration = match &body.response {
                 Some(response) => response.acceleration(&load)[0].length(),
                 None => load.force.length() * body.own_inverse_mass,
             };
-            body.inverse_mass = match &body.response {
+            body.state.properties.inverse_mass = match &body.response {
                 Some(response) => response.inverse_mass(),
                 None => grain.inverse_mass(self.model.params.added_density),
             };
@@ -127,51 +112,37 @@ impl ContactDynamics {
 
     /// Number of sub-steps for `dt` [s], from the shortest contact time of the listed pairs.
     fn substeps_for(&self, dt: f64) -> usize {
-        let mut shortest = f64::INFINITY;
-        let mut any_movable = false;
+        let (mut shortest, mut fastest, mut any_movable) = (f64::INFINITY, 0.0_f64, false);
         for record in &self.records {
-            let pair = pair_properties(&record.key, &self.bodies, &self.wall);
+            let (body, partner) = self.bodies_of(&record.key);
+            let speed = body.surface_speed_relative_to(partner);
+            fastest = fastest.max(speed);
+            let other = partner.map_or(&self.model.wall, |partner| &partner.state.properties);
+            let pair = PairProperties::new(&body.state.properties, other);
             if pair.inverse_mass > 0.0 {
-                let speed = self.relative_speed(&record.key) + self.speed_gain(&record.key);
+                // The pair gains speed from the known loads.
+                let gain = body.speed_gain + partner.map_or(0.0, |partner| partner.speed_gain);
                 let overlap = record.loads.overlap.max(0.0);
-                let time = self.model.contact_time(&pair, speed, overlap);
+                let time = self.model.law.contact_time(&pair, speed + gain, overlap);
                 (shortest, any_movable) = (shortest.min(time), true);
             }
         }
         if !any_movable {
             return 1;
         }
-        let longest_step = shortest / self.model.params.substeps_per_contact;
-        let count = (dt / longest_step.min(self.film_time())).ceil();
+        let ContactParams { substeps_per_contact, roughness, .. } = self.model.params;
+        let mut longest_step = shortest / substeps_per_contact;
+        if self.model.range() > 0.0 && roughness > 0.0 {
+            // No pair closes its lubrication film by more than half the height of the asperities.
+            longest_step = longest_step.min(0.5 * roughness / fastest);
+        }
+        let count = (dt / longest_step).ceil();
         if count.is_nan() { 1 } else { count.clamp(1.0, MAX_SUBSTEPS) as usize }
     }
 
-    /// Time in which no listed pair closes its lubrication film by more than half the height of the
-    /// asperities [s]; infinite without lubrication or asperities.
-    fn film_time(&self) -> f64 {
-        if self.model.range() <= 0.0 || self.model.params.roughness <= 0.0 {
-            return f64::INFINITY;
-        }
-        let speeds = self.records.iter().map(|r| self.relative_speed(&r.key));
-        0.5 * self.model.params.roughness / speeds.fold(0.0, f64::max)
-    }
-
-    /// Upper bound of the relative speed of the surfaces of a pair [m/s].
-    fn relative_speed(&self, key: &PairKey) -> f64 {
-        let body = &self.bodies[key.grain as usize];
-        match key.partner {
-            Partner::Grain(j) => body.surface_speed_relative_to(&self.bodies[j]),
-            Partner::Wall { .. } => body.surface_speed(),
-        }
-    }
-
-    /// Upper bound of the relative speed that a pair gains from the known loads [m/s].
-    fn speed_gain(&self, key: &PairKey) -> f64 {
-        let partner = match key.partner {
-            Partner::Grain(j) => self.bodies[j].speed_gain,
-            Partner::Wall { .. } => 0.0,
-        };
-        self.bodies[key.grain as usize].speed_gain + partner
+    /// First body of a pair, and its partner if that is a grain.
+    fn bodies_of(&self, key: &PairKey) -> (&ContactBody, Option<&ContactBody>) {
+        (&self.bodies[key.grain as usize], key.partner.grain().map(|j| &self.bodies[j]))
     }
 
     /// Evaluates the contact loads at the present poses; `step` [s] is the time since the last
@@ -180,32 +151,57 @@ impl ContactDynamics {
         for (grain, body) in grains.iter().zip(&mut self.bodies) {
             body.update_kinematics(grain, step);
         }
-        let context = PairContext {
-            grains,
-            bodies: &self.bodies,
-            model: &self.model,
-            wall: &self.wall,
-            enclosure: &self.enclosure,
-            step,
-        };
-        let evaluate = |record: &mut ContactRecord| {
-            evaluate_pair(record, &context);
-            record.in_contact_during_step |= record.loads.overlap > 0.0;
-            record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
-        };
+        let mut records = std::mem::take(&mut self.records);
+        let evaluate = |record: &mut ContactRecord| self.evaluate_pair(record, grains, step);
         // Each pair writes its own record and the records are summed in order, so results do not
         // depend on the number of threads.
-        if self.records.len() < PARALLEL_PAIRS {
-            self.records.iter_mut().for_each(evaluate);
+        if records.len() < PARALLEL_PAIRS {
+            records.iter_mut().for_each(evaluate);
         } else {
-            let records = self.records.par_iter_mut();
-            records.with_min_len(4).for_each(evaluate);
+            records.par_iter_mut().with_min_len(4).for_each(evaluate);
         }
+        self.records = records;
         for record in &self.records {
             self.bodies[record.key.grain as usize].contact += record.loads.on_grain;
             if let Partner::Grain(j) = record.key.partner {
                 self.bodies[j].contact += record.loads.on_partner;
             }
         }
+    }
+
+    /// Finds the penetrating points of a pair and evaluates its loads (Eqs 7-18).
+    fn evaluate_pair(&self, record: &mut ContactRecord, grains: &[Grain], step: f64) {
+        let (body, partner) = self.bodies_of(&record.key);
+        let partner_displacement = partner.map_or(0.0, |partner| partner.displacement);
+        record.patch.approach(MOTION_MARGIN * (body.displacement + partner_displacement));
+        if record.patch.separation > 0.0 {
+            return;
+        }
+        let (params, reach) = (&self.model.params, self.model.range());
+        let a = body.posed_shape(grains[record.key.grain as usize].pose.position);
+        let mut branch = DVec3::ZERO;
+        let (friction, other, closest) = match record.key.partner {
+            Partner::Grain(j) => {
+                let image = IVec3::from(record.key.image).as_dvec3() * self.enclosure.period();
+                let b = self.bodies[j].posed_shape(grains[j].pose.position + image);
+                branch = a.position - b.position;
+                let closest = record.patch.find_grain_contact(&a, &b, reach);
+                (params.friction, self.bodies[j].state, closest)
+            }
+            Partner::Wall { axis, side } => {
+                let (axis, side) = (axis as usize, side as usize);
+                let face = self.enclosure.plane(axis, side);
+                let offset = face.distance(a.position);
+                let closest = record.patch.find_wall_contact(&a, face.inward, offset, reach);
+                let (friction, velocity) = match self.enclosure.sides[axis][side] {
+                    Side::Wall { velocity } => (params.wall_friction, velocity),
+                    Side::Open | Side::Frictionless => (0.0, DVec3::ZERO),
+                };
+                (friction, BodyState::translating(self.model.wall, velocity), closest)
+            }
+        };
+        let pair = PairKinematics { branch, bodies: [body.state, other] };
+        self.model.evaluate(record, closest, friction, &pair, step);
+        record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
     }
 }

@@ -14,7 +14,7 @@ mod patches;
 mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
-pub(super) use narrow_phase::{ClosestPoint, ContactPatch, ContactPoint};
+pub(super) use narrow_phase::{ContactPatch, ContactPoint};
 pub(super) use patch_tree::{PatchTree, PosedShape};
 pub(crate) use surface::is_sphere;
 
