@@ -148,7 +148,7 @@ pub(super) fn surface_patches(shape: &Shape, node_spacing: f64) -> Vec<SurfacePa
         cells.entry(cell(node.position)).or_default().push(index);
     }
     let nodes = points.len();
-    let mut nearest_nodes = Vec::new();
+    let mut nearest_nodes: Vec<usize> = (0..nodes).collect();
     let mut distances = vec![node_spacing; nodes];
     for (distance, position) in candidates {
         let (mut nearest, mut nearest_node) = (f64::INFINITY, (f64::INFINITY, None));
@@ -168,13 +168,10 @@ pub(super) fn surface_patches(shape: &Shape, node_spacing: f64) -> Vec<SurfacePa
             distances.push(distance);
         }
     }
-    let mut shares = vec![1.0; nodes];
+    let mut shares = vec![0.0; nodes];
     nearest_nodes.iter().for_each(|node| shares[*node] += 1.0);
-    for (node, share) in points.iter_mut().zip(&shares) {
-        node.area /= share;
-    }
-    for (further, node) in nearest_nodes.iter().enumerate() {
-        points[nodes + further].area = points[*node].area;
+    for (point, node) in points.iter_mut().zip(&nearest_nodes) {
+        point.area = shape.nodes()[*node].area / shares[*node];
     }
     let largest = LARGEST_RADIUS * shape.equivalent_diameter();
     let around =
