@@ -10,19 +10,22 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec3, IVec3};
+use glam::{DMat3, DVec3};
 
+use super::Locator;
 use super::aperture::forcing_reach;
 use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan};
-use super::narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance, store_all};
+use super::narrow_band::{load_all, nearest_distance, store_all};
 use crate::dem::Grain;
-use crate::grid::{FACE_OFFSET, Mesh};
+use crate::grid::FACE_OFFSET;
 use crate::math::Aligned;
 use grainwake_simd::{Kernel, MAX_LANES, Vector};
 
 /// Buffers of one thread.
 #[derive(Default)]
-pub struct DistanceScratch {
+pub struct LocateScratch {
+    /// Faces in the forcing band of the grain located last.
+    pub band: BandFaces,
     /// Candidate faces of a plane, row after row, by axis: first their positions in the frame of
     /// the grain [m], then their unit normals in the space frame. `MAX_LANES` unused entries
     /// follow the last.
@@ -34,36 +37,24 @@ pub struct DistanceScratch {
 
 /// Kernel that fills the lists of one grain.
 pub struct FillLists<'a> {
-    /// Grid.
-    pub mesh: &'a Mesh,
-    /// Half-width of the band [m].
-    pub eps: f64,
-    /// Distance from the surface up to which faces are listed [m].
-    pub reach: f64,
-    /// Grain at its new pose.
-    pub grain: &'a Grain,
+    pub locator: &'a Locator,
     /// Index of the grain.
     pub index: usize,
-    /// Narrow-band shapes of all grains.
-    pub shapes: &'a NarrowBandShapes,
-    /// Grains whose faces may be shared with this grain.
-    pub neighbours: &'a [NeighbourGrain],
-    /// Receives the faces within `reach`; its box is set.
+    /// Grain at its new pose.
+    pub grain: &'a Grain,
+    /// Receives the faces within reach; its box is set.
     pub body: &'a mut LocatedBody,
     /// Receives the faces in the forcing band, by component.
     pub runs: &'a mut [Vec<FaceRun>; 3],
-    /// Receives the distances and normals of the faces in the forcing band.
-    pub band: &'a mut BandFaces,
-    /// Buffers of the thread.
-    pub scratch: &'a mut DistanceScratch,
+    pub scratch: &'a mut LocateScratch,
 }
 
 impl Kernel for FillLists<'_> {
     type Number = f32;
     #[inline(always)]
     fn run<V: Vector<Number = f32>>(mut self) {
-        self.band.clear();
-        let size = self.body.size;
+        self.scratch.band.clear();
+        let (mesh, size) = (&self.locator.mesh, self.body.size);
         for list in &mut self.scratch.points {
             list.make_room((size.x * size.y) as usize + MAX_LANES);
         }
@@ -72,7 +63,9 @@ impl Kernel for FillLists<'_> {
             self.body.spans[component].clear();
             self.body.rows[component].clear();
             self.runs[component].clear();
-            let corner = position(self.mesh, &FACE_OFFSET[component], self.body.lowest);
+            let offset = DVec3::from_array(FACE_OFFSET[component]);
+            let cell = self.body.lowest.as_dvec3() - 1.0;
+            let corner = mesh.origin + mesh.spacing * (cell + offset);
             let mut plane_entry = 0;
             for k in 0..size.z {
                 let count = self.list_candidates::<V>(component, corner, k);
@@ -80,7 +73,7 @@ impl Kernel for FillLists<'_> {
                 let needed = plane_entry + count + MAX_LANES;
                 distances.resize(distances.len().max(needed), f32::INFINITY);
                 self.evaluate::<V>(component, plane_entry, count);
-                self.band.reserve(count);
+                self.scratch.band.reserve(count);
                 for j in 0..size.y {
                     self.list_row::<V>(component, corner, [j, k], plane_entry);
                 }
@@ -100,12 +93,11 @@ impl FillLists<'_> {
         corner: DVec3,
         k: i32,
     ) -> usize {
-        let h = self.mesh.spacing;
+        let h = self.locator.mesh.spacing;
         let to_body = DMat3::from_quat(self.grain.pose.orientation).transpose();
         let step = to_body * (h.x * DVec3::X);
-        let radius = self.grain.shape.bounding_radius() + self.reach;
-        let [x, y, z] = &mut self.scratch.points;
-        let mut points = [&mut x[..], &mut y[..], &mut z[..]];
+        let radius = self.grain.shape.bounding_radius() + self.locator.reach;
+        let mut points = self.scratch.points.each_mut().map(|list| &mut list[..]);
         let mut count = 0;
         for j in 0..self.body.size.y {
             let row = h * DVec3::new(0.0, f64::from(j), f64::from(k));
@@ -136,10 +128,9 @@ impl FillLists<'_> {
         plane_entry: usize,
         count: usize,
     ) {
-        let [x, y, z] = &mut self.scratch.points;
-        let mut points = [&mut x[..], &mut y[..], &mut z[..]];
+        let mut points = self.scratch.points.each_mut().map(|list| &mut list[..]);
         let distances = &mut self.body.distance[component][plane_entry..];
-        let shape = self.shapes.of(self.index);
+        let shape = self.locator.shapes.of(self.index);
         let mean_distances = &mut self.scratch.mean_distances[..];
         shape.fill_distances::<V>(&mut points, [distances, mean_distances], count);
         let [a, b, c] = DMat3::from_quat(self.grain.pose.orientation).to_cols_array_2d();
@@ -168,13 +159,13 @@ impl FillLists<'_> {
         let mut candidates = self.body.spans[component][row];
         candidates.first += plane_entry;
         let distances = &mut self.body.distance[component];
-        let limits = [self.reach, forcing_reach(self.eps)];
+        let limits = [self.locator.reach, forcing_reach(self.locator.eps)];
         let [span, in_band] = shorten::<V>(distances, candidates, limits);
         self.body.spans[component][row] = span;
-        let h = self.mesh.spacing;
+        let h = self.locator.mesh.spacing;
         let start = corner + h * DVec3::new(0.0, f64::from(j), f64::from(k));
         let step = h.x * DVec3::X;
-        let DistanceScratch { points, mean_distances, parts } = &mut *self.scratch;
+        let LocateScratch { band, points, mean_distances, parts } = &mut *self.scratch;
         parts.clear();
         (self.body.index_map).contiguous_parts(component, [j, k], span.start..span.end, parts);
         for part in &*parts {
@@ -182,64 +173,47 @@ impl FillLists<'_> {
             let first = span.entry(range.start);
             self.body.rows[component].push(FaceRow { at: part.at, first, count: range.len() });
             let forced = range.start.max(in_band.start)..range.end.min(in_band.end);
-            let first_forced = self.band.count();
             if !forced.is_empty() {
                 let skipped = (forced.start - range.start) as usize;
                 self.runs[component].push(FaceRun {
                     at: part.at + skipped,
                     below: part.below + skipped,
                     lever_arm: start - self.grain.pose.position + f64::from(forced.start) * step,
-                    first: first_forced,
+                    first: band.count(),
                     count: forced.len(),
                 });
                 let entry = candidates.entry(forced.start);
                 let normal = points.each_ref().map(|list| &list[entry - plane_entry..]);
                 let distances = [&distances[entry..], &mean_distances[entry - plane_entry..]];
-                self.band.extend::<V>(forced.len(), distances, normal);
+                band.extend::<V>(forced.len(), distances, normal);
             }
-            if !self.neighbours.is_empty() {
-                let row = SharedRow {
-                    neighbours: self.neighbours,
-                    shapes: self.shapes,
-                    eps: self.eps,
-                    reach: self.reach,
-                    start,
-                    step,
-                };
-                row.assign(range, forced, &mut distances[first..], first_forced, self.band);
+            if !self.locator.neighbours(self.index).is_empty() {
+                let distances = &mut distances[first..];
+                self.locator.assign(self.index, [start, step], [range, forced], distances, band);
             }
         }
     }
 }
 
-/// Faces of a row near several grains; each face is assigned to the nearest grain.
-struct SharedRow<'a> {
-    neighbours: &'a [NeighbourGrain],
-    shapes: &'a NarrowBandShapes,
-    eps: f64,
-    reach: f64,
-    /// Position of face 0 [m].
-    start: DVec3,
-    /// Vector from a face to the next [m].
-    step: DVec3,
-}
-
-impl SharedRow<'_> {
-    /// Sets the distances of faces in `range` that are nearer to another grain to infinity. Of the
-    /// `forced` faces, listed from `first_forced` on, those deep inside a nearer neighbour get a
-    /// distance outside the band, and those in its band are recorded as shared.
+impl Locator {
+    /// Assigns faces of a row near several grains to the nearest grain: sets the `distances` from
+    /// grain `index` of faces in `range` that are nearer to another grain to infinity. Of the
+    /// `forced` faces, the last of `band`, those deep inside a nearer neighbour get a distance
+    /// outside the band, and those in its band are recorded as shared. `start` is the position of
+    /// face 0 and `step` the vector from a face to the next [m].
     fn assign(
         &self,
-        range: Range<i32>,
-        forced: Range<i32>,
+        index: usize,
+        [start, step]: [DVec3; 2],
+        [range, forced]: [Range<i32>; 2],
         distances: &mut [f32],
-        first_forced: usize,
         band: &mut BandFaces,
     ) {
+        let first_forced = band.count() - forced.len();
         for (i, distance) in range.zip(distances) {
-            let x = self.start + f64::from(i) * self.step;
+            let x = start + f64::from(i) * step;
             let d = f64::from(*distance);
-            let nearest = nearest_distance(self.neighbours, self.shapes, x, self.reach);
+            let nearest = nearest_distance(self.neighbours(index), &self.shapes, x, self.reach);
             if forced.contains(&i) {
                 let entry = first_forced + (i - forced.start) as usize;
                 if nearest <= -self.eps && nearest < d {
@@ -302,12 +276,6 @@ fn extend([start, end]: &mut [usize; 2], at: usize, lanes: u32) {
         *start = (*start).min(at + lanes.trailing_zeros() as usize);
         *end = at + 32 - lanes.leading_zeros() as usize;
     }
-}
-
-/// Position of the face or centre at `offset` in a cell counted from 1 [m].
-fn position(mesh: &Mesh, offset: &[f64; 3], cell: IVec3) -> DVec3 {
-    let offset = DVec3::from_array(*offset);
-    mesh.origin + mesh.spacing * (cell.as_dvec3() - 1.0 + offset)
 }
 
 #[cfg(test)]

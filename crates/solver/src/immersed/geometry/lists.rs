@@ -8,7 +8,6 @@ use std::ops::Range;
 
 use glam::{DVec3, IVec3};
 
-use crate::flow::Boundaries;
 use crate::grid::{Layout, Mesh};
 use crate::math::Real;
 use grainwake_simd::{MAX_LANES, Vector};
@@ -88,13 +87,12 @@ impl LocatedBody {
 
     /// Memory held [bytes].
     pub fn bytes(&self) -> usize {
-        let distances: usize = self.distance.iter().map(Vec::capacity).sum();
-        let spans: usize = self.spans.iter().map(Vec::capacity).sum();
-        let rows: usize = self.rows.iter().map(Vec::capacity).sum();
-        size_of::<f32>() * distances
-            + self.index_map.bytes()
-            + size_of::<RowSpan>() * spans
-            + size_of::<FaceRow>() * rows
+        let lists = (0..3).map(|component| {
+            size_of::<f32>() * self.distance[component].capacity()
+                + size_of::<RowSpan>() * self.spans[component].capacity()
+                + size_of::<FaceRow>() * self.rows[component].capacity()
+        });
+        lists.sum::<usize>() + self.index_map.bytes()
     }
 }
 
@@ -182,63 +180,10 @@ impl BandFaces {
     }
 }
 
-/// Faces and cells of the grid that are unknowns, and their positions in memory.
-#[derive(Clone, Copy)]
-pub struct UnknownFaces {
-    cells: IVec3,
-    strides: [usize; 3],
-    periodic: [bool; 3],
-}
-
 /// Width of the padding: cells on each side of the box for which positions are tabulated too.
 pub const PAD: i32 = 3;
 /// Offset of faces and cells that are not unknown: larger than any position, also in sums.
 const NONE: usize = 1 << 60;
-
-impl UnknownFaces {
-    /// Unknowns of the grid `mesh`, periodic along the axes of the periodic `boundaries`.
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries) -> UnknownFaces {
-        let [x, y, z] = mesh.cells.map(|n| n as i32);
-        UnknownFaces {
-            cells: IVec3::new(x, y, z),
-            strides: mesh.layout().strides(),
-            periodic: boundaries.periodic(),
-        }
-    }
-
-    /// Returns whether the grid is periodic along an axis.
-    pub fn is_periodic(&self, axis: usize) -> bool {
-        self.periodic[axis]
-    }
-
-    /// Fills the index map of the box of `size` cells from cell `first` on (counted from 1).
-    pub fn map(&self, first: IVec3, size: IVec3, map: &mut IndexMap) {
-        for axis in 0..3 {
-            let (n, stride) = (self.cells[axis], self.strides[axis]);
-            let padded = first[axis] - PAD..first[axis] + size[axis] + PAD;
-            for (normal, offsets) in map.unknown_offsets[axis].iter_mut().enumerate() {
-                let offset = |i: i32| {
-                    if self.periodic[axis] {
-                        ((i - 1).rem_euclid(n) + 1) as usize * stride
-                    } else if i > normal as i32 && i <= n {
-                        i as usize * stride
-                    } else {
-                        NONE
-                    }
-                };
-                offsets.clear();
-                offsets.extend(padded.clone().map(offset));
-            }
-            let offset = |i: i32| {
-                let i =
-                    if self.periodic[axis] { (i - 1).rem_euclid(n) + 1 } else { i.clamp(0, n + 1) };
-                i as usize * stride
-            };
-            map.offsets[axis].clear();
-            map.offsets[axis].extend(padded.map(offset));
-        }
-    }
-}
 
 /// Positions in memory in the padded box of one grain, as sums of one offset per axis.
 #[derive(Clone, Debug, Default)]
@@ -262,6 +207,27 @@ pub struct RowPart {
 }
 
 impl IndexMap {
+    /// Fills the map of the box of `size` cells from cell `first` on (counted from 1).
+    pub fn fill(&mut self, mesh: &Mesh, periodic: [bool; 3], first: IVec3, size: IVec3) {
+        let strides = mesh.layout().strides();
+        for axis in 0..3 {
+            let (n, stride, periodic) = (mesh.cells[axis] as i32, strides[axis], periodic[axis]);
+            let padded = first[axis] - PAD..first[axis] + size[axis] + PAD;
+            let offset = |i: i32| {
+                let i = if periodic { (i - 1).rem_euclid(n) + 1 } else { i.clamp(0, n + 1) };
+                i as usize * stride
+            };
+            for (lowest, offsets) in (1..).zip(&mut self.unknown_offsets[axis]) {
+                let is_unknown = |i: i32| periodic || (lowest..=n).contains(&i);
+                let unknown = |i: i32| if is_unknown(i) { offset(i) } else { NONE };
+                offsets.clear();
+                offsets.extend(padded.clone().map(unknown));
+            }
+            self.offsets[axis].clear();
+            self.offsets[axis].extend(padded.map(offset));
+        }
+    }
+
     /// Indices along `axis` of the unknown faces of `component` in the padded box. They are
     /// contiguous, since only the ends of the grid exclude faces.
     pub fn unknown_range(&self, component: usize, axis: usize) -> Range<i32> {
@@ -351,13 +317,10 @@ mod tests {
 
     #[test]
     fn walls_bound_the_unknowns_and_periodic_edges_wrap() {
-        let unknown_faces = UnknownFaces {
-            cells: IVec3::new(8, 6, 1),
-            strides: [1, 10, 80],
-            periodic: [true, false, true],
-        };
+        let mesh = Mesh::cubic([8, 6, 1], 1.0);
+        let [_, row, plane] = mesh.layout().strides();
         let mut map = IndexMap::default();
-        unknown_faces.map(IVec3::new(6, 1, 1), IVec3::new(5, 3, 1), &mut map);
+        map.fill(&mesh, [true, false, true], IVec3::new(6, 1, 1), IVec3::new(5, 3, 1));
         // Position in memory of a face, or of a cell if the component is 3.
         let at = |component, i, j| {
             let offset = |axis: usize, index: i32| {
@@ -367,23 +330,23 @@ mod tests {
             (at < NONE).then_some(at)
         };
         // Cell 6 + 4 is cell 2 across the periodic edge.
-        assert_eq!(at(3, 4, 0), Some(2 + 10 + 80));
-        assert_eq!(at(0, 3, 2), Some(1 + 30 + 80));
+        assert_eq!(at(3, 4, 0), Some(2 + row + plane));
+        assert_eq!(at(0, 3, 2), Some(1 + 3 * row + plane));
         // The face on the wall is no unknown, the cell above it is; below the wall there are none.
         assert_eq!(at(1, 0, 0), None);
-        assert_eq!(at(0, 0, 0), Some(6 + 10 + 80));
+        assert_eq!(at(0, 0, 0), Some(6 + row + plane));
         assert_eq!(at(3, 0, -1), None);
-        assert_eq!(at(3, 0, 5), Some(6 + 60 + 80));
-        assert_eq!(at(3, -3, 5), Some(3 + 60 + 80));
+        assert_eq!(at(3, 0, 5), Some(6 + 6 * row + plane));
+        assert_eq!(at(3, -3, 5), Some(3 + 6 * row + plane));
         assert_eq!(map.unknown_range(1, 0), -3..8);
         assert_eq!([map.unknown_range(1, 1), map.unknown_range(0, 1)], [1..6, 0..6]);
         // A field whose values are its memory positions; ghost cells beyond the wall included.
-        let field: Vec<f64> = (0..240).map(f64::from).collect();
+        let field: Vec<f64> = (0..mesh.layout().len()).map(|at| at as f64).collect();
         let mut copy = Vec::new();
         map.copy(&field, &mut copy);
         let copied = |i: usize, j: usize, k: usize| copy[i + 3 + 11 * (j + 3 + 9 * (k + 3))];
-        assert_eq!(copied(4, 0, 0), 2.0 + 10.0 + 80.0);
-        assert_eq!(copied(0, 2, 0), 6.0 + 30.0 + 80.0);
-        assert_eq!(copy[3 + 11 * (2 + 27)], 6.0 + 80.0, "the ghost below");
+        assert_eq!(copied(4, 0, 0), (2 + row + plane) as f64);
+        assert_eq!(copied(0, 2, 0), (6 + 3 * row + plane) as f64);
+        assert_eq!(copy[3 + 11 * (2 + 27)], (6 + plane) as f64, "the ghost below");
     }
 }

@@ -11,6 +11,7 @@ mod narrow_band;
 mod samples;
 mod sampling;
 
+pub use distances::LocateScratch;
 pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
 pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
 
@@ -21,18 +22,9 @@ use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::flow::Boundaries;
 use crate::grid::Mesh;
 use aperture::forcing_reach;
-use distances::{DistanceScratch, FillLists};
+use distances::FillLists;
 use grainwake_simd::dispatch;
-use lists::UnknownFaces;
 use samples::BandSamples;
-
-/// Buffers of one thread.
-#[derive(Default)]
-pub struct LocateScratch {
-    /// Faces in the forcing band of the grain located last.
-    pub band: BandFaces,
-    distances: DistanceScratch,
-}
 
 /// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
 /// depends more on where the grid lies; a wider one smooths thin boundary layers
@@ -56,7 +48,7 @@ pub fn narrow_band_bytes(mesh: &Mesh, shape: &Shape) -> f64 {
 /// Geometry of all grains on one grid.
 pub struct Locator {
     mesh: Mesh,
-    unknown_faces: UnknownFaces,
+    periodic: [bool; 3],
     /// Half-width of the band around the surface [m].
     eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
@@ -71,7 +63,7 @@ impl Locator {
         let [eps, reach] = half_width_and_reach(mesh);
         Locator {
             mesh: *mesh,
-            unknown_faces: UnknownFaces::new(mesh, boundaries),
+            periodic: boundaries.periodic(),
             eps,
             reach,
             shapes: NarrowBandShapes::new(grains, [eps, reach], mesh.resolved_axes().count()),
@@ -82,7 +74,7 @@ impl Locator {
     /// Replaces the grid by one of the same spacing.
     pub fn set_grid(&mut self, mesh: &Mesh, boundaries: &Boundaries) {
         self.mesh = *mesh;
-        self.unknown_faces = UnknownFaces::new(mesh, boundaries);
+        self.periodic = boundaries.periodic();
     }
 
     /// Half-width of the band around the surface [m].
@@ -108,7 +100,7 @@ impl Locator {
     /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] is the
     /// distance of grain i from its last pose, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
-        self.neighbours.update(&self.mesh, &self.unknown_faces, self.reach, grains, displacement);
+        self.neighbours.update(&self.mesh, self.periodic, self.reach, grains, displacement);
     }
 
     /// Neighbours of grain `index`.
@@ -128,19 +120,7 @@ impl Locator {
     ) {
         body.position = grain.pose.position;
         self.set_box(grain, body);
-        dispatch(FillLists {
-            mesh: &self.mesh,
-            eps: self.eps,
-            reach: self.reach,
-            grain,
-            index,
-            shapes: &self.shapes,
-            neighbours: self.neighbours.of(index),
-            body,
-            runs,
-            band: &mut scratch.band,
-            scratch: &mut scratch.distances,
-        });
+        dispatch(FillLists { locator: self, index, grain, body, runs, scratch });
     }
 
     /// Sets the box of cells around a grain.
@@ -165,7 +145,7 @@ impl Locator {
             body.lowest[axis] = from + 1;
             body.size[axis] = to + 2 - body.lowest[axis];
         }
-        self.unknown_faces.map(body.lowest, body.size, &mut body.index_map);
+        body.index_map.fill(mesh, self.periodic, body.lowest, body.size);
         body.planes = body.index_map.plane_range();
     }
 }
@@ -180,20 +160,13 @@ const TIE: f64 = 1e-6;
 pub struct NeighbourSearch {
     search: BroadPhase,
     spheres: Vec<BoundingSphere>,
-    pairs: Vec<NeighbourPair>,
+    /// Both directions of all pairs: grain, other grain, and periods between the image of the
+    /// other grain and its own position, along z first. Sorted in this order.
+    pairs: Vec<(usize, usize, [i32; 3])>,
     /// Neighbours of grain 0, then of grain 1, ...
     neighbours: Vec<NeighbourGrain>,
     /// Entry of the first neighbour of each grain; one entry more at the end.
     first: Vec<usize>,
-}
-
-/// One direction of a pair, in the order of the lists.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct NeighbourPair {
-    grain: usize,
-    other: usize,
-    /// Periods between the image of the other grain and its own position, along z first.
-    image: [i32; 3],
 }
 
 impl NeighbourSearch {
@@ -202,7 +175,7 @@ impl NeighbourSearch {
     pub fn update(
         &mut self,
         mesh: &Mesh,
-        unknown_faces: &UnknownFaces,
+        periodic: [bool; 3],
         reach: f64,
         grains: &[Grain],
         displacement: impl Fn(usize) -> f64,
@@ -210,8 +183,7 @@ impl NeighbourSearch {
         let enclosure = Enclosure {
             lower: mesh.origin,
             upper: mesh.upper(),
-            periodic: [0, 1, 2]
-                .map(|axis| unknown_faces.is_periodic(axis) && mesh.is_resolved(axis)),
+            periodic: [0, 1, 2].map(|axis| periodic[axis] && mesh.is_resolved(axis)),
             sides: Default::default(),
         };
         self.spheres.clear();
@@ -228,8 +200,7 @@ impl NeighbourSearch {
             };
             let (grain, [x, y, z]) = (pair.grain as usize, pair.image);
             for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
-                let image = [z, y, x].map(|periods| sign * periods);
-                self.pairs.push(NeighbourPair { grain, other, image });
+                self.pairs.push((grain, other, [z, y, x].map(|periods| sign * periods)));
             }
         }
         self.pairs.sort_unstable();
@@ -241,7 +212,7 @@ impl NeighbourSearch {
         self.neighbours.clear();
         self.first.clear();
         let size = |index: usize| grains[index].shape.bounding_radius() + reach;
-        for &NeighbourPair { grain: index, other, image: [z, y, x] } in &self.pairs {
+        for &(index, other, [z, y, x]) in &self.pairs {
             let entry = self.neighbours.len();
             self.first.resize(self.first.len().max(index + 1), entry);
             let tie = TIE * (size(index) + size(other));
@@ -269,7 +240,6 @@ impl NeighbourSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::{Boundaries, Boundary};
     use grainwake_shape::Shape;
     use std::sync::Arc;
 
@@ -280,8 +250,6 @@ mod tests {
             spacing: DVec3::splat(0.25),
             origin: DVec3::new(-1.0, 0.0, 0.0),
         };
-        let boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
-        let unknown_faces = UnknownFaces::new(&mesh, &boundaries);
         let shape = Arc::new(Shape::sphere(0.5, 100));
         // The first and the last are 1.1 apart across x; the second has no neighbours.
         let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));
@@ -291,7 +259,7 @@ mod tests {
             let neighbours = search.of(index).iter();
             neighbours.map(|n| (n.shift, n.tie_breaker)).collect()
         };
-        search.update(&mesh, &unknown_faces, 0.6, &grains, |_| 0.0);
+        search.update(&mesh, [true; 3], 0.6, &grains, |_| 0.0);
         let tie = 2.2 * TIE;
         let along_x = DVec3::new(8.0, 0.0, 0.0);
         assert_eq!(found(&search, 0), [(-along_x, tie)]);
@@ -299,14 +267,14 @@ mod tests {
         assert_eq!(found(&search, 2), [(along_x, -tie)]);
         assert_eq!([0, 1, 2].map(|index| search.of(index).is_empty()), [false, true, false]);
         // The second is 3.4 from the third, both with a reach of 1.1, and moved by 1.25.
-        search.update(&mesh, &unknown_faces, 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
+        search.update(&mesh, [true; 3], 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
         assert!(!search.of(1).is_empty());
         let others = found(&search, 1).into_iter();
         let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
         assert_eq!(others.count(), 1, "the others are its own images");
         assert_eq!(found(&search, 0), [(-along_x, tie)]);
         // With a reach of more than half a period a grain neighbours its own images.
-        search.update(&mesh, &unknown_faces, 1.6, &grains[1..2], |_| 0.0);
+        search.update(&mesh, [true; 3], 1.6, &grains[1..2], |_| 0.0);
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
