@@ -50,7 +50,7 @@ impl Simulation {
                 * (grain.mass() * grain.velocity.length_squared()
                     + spin.dot(grain.inertia() * spin));
             d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
-            if let Some(open_sides) = &self.open_sides {
+            if let Some(open_sides) = &self.data.open_sides {
                 d.momentum += open_sides.emerged_momentum(index, grain, fluid_density);
             }
         }
@@ -64,7 +64,7 @@ impl Simulation {
             let volume = self.setup.mesh.cell_volume() * self.setup.mesh.cell_count() as f64;
             let scale = params.density * volume * d.max_velocity;
             d.momentum_residual =
-                if scale > 0.0 { self.momentum_residual.length() / scale } else { 0.0 };
+                if scale > 0.0 { self.data.momentum_residual.length() / scale } else { 0.0 };
         }
         d
     }

@@ -55,19 +55,19 @@ pub struct Simulation {
     setup: Setup,
     clock: Clock,
     fluid: Option<Box<dyn Fluid>>,
+    data: StepData,
+}
+
+/// Data of a step besides those of the fluid; each list has one entry per grain.
+struct StepData {
     dynamics: ContactDynamics,
     /// Open sides of the box; none if all are walls or periodic.
     open_sides: Option<OpenSides>,
-    /// Mean hydrodynamic load on each grain over the last step.
-    loads: Vec<Load>,
+    times: PassTimes,
     /// Change of momentum in the last step not explained by forces [kg m/s].
     momentum_residual: DVec3,
-    data: GrainData,
-    times: PassTimes,
-}
-
-/// Data of a step; each list has one entry per grain.
-struct GrainData {
+    /// Mean hydrodynamic loads over the last step; zero without fluid.
+    loads: Vec<Load>,
     previous: Vec<PreviousStep>,
     kinematics: Vec<GrainKinematics>,
     /// Loads set between steps.
@@ -85,10 +85,18 @@ struct GrainData {
     located: Vec<Pose>,
 }
 
-impl GrainData {
-    fn new(grains: &[Grain]) -> GrainData {
-        let count = grains.len();
-        GrainData {
+impl StepData {
+    fn new(setup: &Setup, times: PassTimes) -> StepData {
+        let (grains, count) = (&setup.grains, setup.grains.len());
+        // With fluid the equations of the grains contain the damping (`Start::prepare`).
+        let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
+        let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
+        StepData {
+            dynamics: ContactDynamics::new(contact, setup.enclosure()),
+            open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, grains),
+            times,
+            momentum_residual: DVec3::ZERO,
+            loads: vec![Load::default(); count],
             previous: vec![PreviousStep::default(); count],
             kinematics: vec![GrainKinematics::default(); count],
             external: vec![Load::default(); count],
@@ -113,23 +121,11 @@ impl Simulation {
     pub fn new(mut setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
         (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
-        // With fluid the equations of the grains contain the damping (`Start::prepare`).
-        let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
-        let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
-        let dynamics = ContactDynamics::new(contact, setup.enclosure());
         let fluid = setup.fluid.map(|params| fluid::start(&mut setup, &params));
         let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
-        Ok(Simulation {
-            dynamics,
-            open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, &setup.grains),
-            clock: Clock::new(&setup),
-            loads: vec![Load::default(); setup.grains.len()],
-            momentum_residual: DVec3::ZERO,
-            data: GrainData::new(&setup.grains),
-            times: PassTimes { initial, ..PassTimes::default() },
-            fluid,
-            setup,
-        })
+        let times = PassTimes { initial, ..PassTimes::default() };
+        let (clock, data) = (Clock::new(&setup), StepData::new(&setup, times));
+        Ok(Simulation { setup, clock, fluid, data })
     }
     /// Simulated time [s].
     pub fn time(&self) -> f64 {
@@ -158,20 +154,20 @@ impl Simulation {
     /// Mean hydrodynamic load on each grain over the last step (Eq. 5), without buoyancy: force [N]
     /// and torque about the centroid [N m], space frame.
     pub fn loads(&self) -> &[Load] {
-        &self.loads
+        &self.data.loads
     }
     /// Pairs that touched during the last step.
     pub fn contacts(&self) -> &[Contact] {
-        self.dynamics.contacts()
+        self.data.dynamics.contacts()
     }
     /// Largest overlap at any sub-step of the last step; `None` without contact.
     pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
-        self.dynamics.largest_overlap()
+        self.data.dynamics.largest_overlap()
     }
     /// Contact sub-steps of the last step; of a step repeated with the response of the fluid, those
     /// of the repetition.
     pub fn substeps(&self) -> usize {
-        self.dynamics.substeps()
+        self.data.dynamics.substeps()
     }
     /// Memory held by fields, solver and grains on the grid [bytes].
     pub fn bytes(&self) -> usize {

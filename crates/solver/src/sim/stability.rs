@@ -152,7 +152,7 @@ impl Simulation {
         if let Some((what, remedy)) = self.excessive_overlap() {
             return unstable(what, remedy);
         }
-        let emerged = self.open_sides.as_ref().and_then(OpenSides::emerged);
+        let emerged = self.data.open_sides.as_ref().and_then(OpenSides::emerged);
         if let Some(grain) = emerged.filter(|_| self.setup.refinement > 1) {
             let what =
                 format!("grain {grain} reaches the free surface, where the grid cannot be refined");

@@ -4,58 +4,39 @@
 use glam::DVec3;
 
 use super::fluid::Fluid;
-use super::prescription::Prescription;
-use super::timing::PassTimes;
-use super::{GrainData, Simulation};
+use super::{Setup, Simulation, StepData};
 use crate::dem::{
     ContactDynamics, Grain, GrainKinematics, MotionConstraint, RigidState, TrialStep,
 };
 use crate::immersed::{
-    CoupledGrains, CouplingInput, Crossing, OpenSides, PreviousStep, RigidityInput, Scheme,
+    CoupledGrains, CouplingInput, Crossing, PreviousStep, RigidityInput, Scheme,
 };
 use crate::math::{Load, RigidVelocity, timed};
 
 /// Grains of a step, with or without fluid.
-struct GrainContext<'a> {
-    grains: &'a mut [Grain],
-    dynamics: &'a mut ContactDynamics,
-    /// Hydrodynamic loads; zero without fluid.
-    loads: &'a mut [Load],
-    data: &'a mut GrainData,
-    prescription: &'a Prescription,
-    open_sides: Option<&'a mut OpenSides>,
-    times: &'a mut PassTimes,
+pub(super) struct GrainContext<'a> {
+    setup: &'a mut Setup,
+    data: &'a mut StepData,
     /// Time at the start of the step [s].
     time: f64,
     /// Length of the step [s].
     dt: f64,
 }
 
-/// Fluid of a step.
-struct FluidContext<'a> {
-    fluid: &'a mut dyn Fluid,
-    scheme: Scheme,
-    /// Density [kg/m^3].
-    density: f64,
-    momentum_residual: &'a mut DVec3,
-}
-
 /// State that all stages of a coupled step work on.
-struct Context<'a> {
+pub(super) struct Context<'a> {
     solid: GrainContext<'a>,
-    flow: FluidContext<'a>,
+    fluid: &'a mut dyn Fluid,
 }
 
 /// Step about to begin.
 pub(super) enum Start<'a> {
-    Coupled(CoupledStart<'a>),
-    Dry(DryStart<'a>),
+    /// Step of fluid and grains.
+    Coupled(Context<'a>),
+    /// Step without fluid.
+    Dry(GrainContext<'a>),
 }
 
-/// Coupled step about to begin.
-pub(super) struct CoupledStart<'a>(Context<'a>);
-/// Step without fluid about to begin.
-pub(super) struct DryStart<'a>(GrainContext<'a>);
 /// Flow predicted without the grains.
 pub(super) struct Predicted<'a>(Context<'a>);
 /// Grains at their new poses, by a trial step of contact.
@@ -77,27 +58,15 @@ impl<'a> Start<'a> {
     /// Records the state before the step of `dt` [s] and sets weight, buoyancy, external
     /// loads and prescribed motion.
     pub fn prepare(sim: &'a mut Simulation, dt: f64) -> Start<'a> {
-        let (setup, time) = (&mut sim.setup, sim.clock.time);
-        let mut solid = GrainContext {
-            grains: &mut setup.grains,
-            dynamics: &mut sim.dynamics,
-            loads: &mut sim.loads,
-            data: &mut sim.data,
-            prescription: &setup.prescription,
-            open_sides: sim.open_sides.as_mut(),
-            times: &mut sim.times,
-            time,
-            dt,
-        };
+        let Simulation { setup, clock, fluid, data } = sim;
         let fluid_density = setup.fluid.map_or(0.0, |params| params.density);
-        let data = &mut *solid.data;
-        if let Some(open_sides) = &mut solid.open_sides {
-            open_sides.update(solid.grains, dt);
+        if let Some(open_sides) = &mut data.open_sides {
+            open_sides.update(&mut setup.grains, dt);
             open_sides.extrapolate_accelerations(&mut data.previous);
         }
-        for (i, grain) in solid.grains.iter().enumerate() {
+        for (i, grain) in setup.grains.iter().enumerate() {
             let crossing =
-                solid.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
+                data.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
             data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
             if let Crossing::Departing(_) = crossing {
@@ -105,7 +74,7 @@ impl<'a> Start<'a> {
                 data.previous[i].pending_added_mass_velocity = RigidVelocity::default();
             }
             if let Crossing::Left = crossing {
-                (data.previous[i], solid.loads[i]) = (PreviousStep::default(), Load::default());
+                (data.previous[i], data.loads[i]) = (PreviousStep::default(), Load::default());
             } else if !data.external[i].is_zero() {
                 // A zero load is not added: it would turn -0.0 into 0.0.
                 data.applied[i] += data.external[i];
@@ -114,68 +83,58 @@ impl<'a> Start<'a> {
                 data.applied[i] += damping_load(grain, setup.contact.global_damping, dt);
             }
         }
+        let time = clock.time;
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
-        (setup.prescription).prescribe_motion(solid.grains, time + 0.5 * dt);
-        let Some(fluid) = sim.fluid.as_deref_mut() else {
-            return Start::Dry(DryStart(solid));
+        setup.prescription.prescribe_motion(&mut setup.grains, time + 0.5 * dt);
+        let Some(fluid) = fluid.as_deref_mut() else {
+            return Start::Dry(GrainContext { setup, data, time, dt });
         };
-        for (kinematics, grain) in data.kinematics.iter_mut().zip(&*solid.grains) {
+        for (kinematics, grain) in data.kinematics.iter_mut().zip(&setup.grains) {
             *kinematics = GrainKinematics::of(grain);
         }
         if let Some(acceleration) = setup.prescription.body_acceleration(time) {
             fluid.set_body_acceleration(acceleration);
         }
-        if let Some(open_sides) = &solid.open_sides {
-            fluid.set_crossing_speeds(open_sides.speeds(solid.grains));
+        if let Some(open_sides) = &data.open_sides {
+            fluid.set_crossing_speeds(open_sides.speeds(&setup.grains));
         }
-        let flow = FluidContext {
-            fluid,
-            scheme: setup.scheme,
-            density: fluid_density,
-            momentum_residual: &mut sim.momentum_residual,
-        };
-        Start::Coupled(CoupledStart(Context { solid, flow }))
+        Start::Coupled(Context { solid: GrainContext { setup, data, time, dt }, fluid })
     }
 }
 
 impl GrainContext<'_> {
-    /// Moves the grains by `take_substeps` under weight, buoyancy and the hydrodynamic load of the
+    /// Moves the grains by the sub-steps `take` under weight, buoyancy and the hydrodynamic load of the
     /// last step (Eqs 6 to 36).
-    fn move_grains<T>(
+    fn take_substeps<T>(
         &mut self,
-        take_substeps: impl FnOnce(&mut ContactDynamics, &mut [Grain], &[Load], f64, &mut [Load]) -> T,
+        take: impl FnOnce(&mut ContactDynamics, &mut [Grain], &[Load], f64, &mut [Load]) -> T,
     ) -> T {
-        let data = &mut *self.data;
+        let (data, grains) = (&mut *self.data, &mut self.setup.grains);
         for (i, driving) in data.driving.iter_mut().enumerate() {
-            *driving = data.applied[i] + self.loads[i];
-            if let Some(load) = data.previous[i].uptake_load(&self.grains[i]) {
+            *driving = data.applied[i] + data.loads[i];
+            if let Some(load) = data.previous[i].uptake_load(&grains[i]) {
                 *driving += load;
             }
         }
-        let taken = timed(&mut self.times.contact, || {
-            take_substeps(self.dynamics, self.grains, &data.driving, self.dt, &mut data.contact)
+        let taken = timed(&mut data.times.contact, || {
+            take(&mut data.dynamics, grains, &data.driving, self.dt, &mut data.contact)
         });
-        let end = self.time + self.dt;
-        self.prescription.set_velocities(self.grains, end);
+        self.setup.prescription.set_velocities(grains, self.time + self.dt);
         taken
     }
-}
 
-impl DryStart<'_> {
     /// Moves the grains in contact sub-steps; nothing else happens without fluid.
-    pub fn move_grains(self) {
-        let DryStart(mut step) = self;
-        step.move_grains(ContactDynamics::advance);
+    pub fn move_grains(mut self) {
+        self.take_substeps(ContactDynamics::advance);
     }
 }
 
-impl<'a> CoupledStart<'a> {
+impl<'a> Context<'a> {
     /// Predicts the flow without the grains.
     pub fn predict(self) -> Predicted<'a> {
-        let CoupledStart(mut step) = self;
-        let Context { solid, flow } = &mut step;
-        timed(&mut solid.times.predict, || flow.fluid.predict(solid.dt));
-        Predicted(step)
+        let Context { solid, fluid } = self;
+        timed(&mut solid.data.times.predict, || fluid.predict(solid.dt));
+        Predicted(Context { solid, fluid })
     }
 }
 
@@ -183,7 +142,7 @@ impl<'a> Predicted<'a> {
     /// Moves the grains in contact sub-steps under the hydrodynamic load of the last step.
     pub fn move_grains(self) -> Moved<'a> {
         let Predicted(mut step) = self;
-        let trial = step.solid.move_grains(ContactDynamics::trial_step);
+        let trial = step.solid.take_substeps(ContactDynamics::trial_step);
         Moved(step, trial)
     }
 }
@@ -193,29 +152,29 @@ impl<'a> Moved<'a> {
     /// The paper's scheme projects the prediction first.
     pub fn couple(self) -> Coupled<'a> {
         let Moved(mut step, trial) = self;
-        let Context { solid, flow } = &mut step;
-        let dt = solid.dt;
-        if flow.scheme == Scheme::Paper {
-            timed(&mut solid.times.project, || flow.fluid.project_prediction(dt));
+        let Context { solid: GrainContext { setup, data, dt, .. }, fluid } = &mut step;
+        let (grains, dt) = (&setup.grains, *dt);
+        if setup.scheme == Scheme::Paper {
+            timed(&mut data.times.project, || fluid.project_prediction(dt));
         }
         let (mut crossings, mut surface_loads) = (&[][..], Vec::new());
-        if let Some(open_sides) = &mut solid.open_sides {
-            open_sides.list_covered_faces(solid.grains);
-            surface_loads = open_sides.surface_loads(|faces| flow.fluid.pressure_below(faces));
+        if let Some(open_sides) = &mut data.open_sides {
+            open_sides.list_covered_faces(grains);
+            surface_loads = open_sides.surface_loads(|faces| fluid.pressure_below(faces));
             crossings = open_sides.crossings();
         }
         let input = CouplingInput {
-            grains: solid.grains,
-            kinematics: &solid.data.kinematics,
-            previous: &solid.data.previous,
-            contact: &solid.data.contact,
-            applied: &solid.data.applied,
-            last_loads: solid.loads,
+            grains,
+            kinematics: &data.kinematics,
+            previous: &data.previous,
+            contact: &data.contact,
+            applied: &data.applied,
+            last_loads: &data.loads,
             crossings,
             surface_loads: &surface_loads,
             dt,
         };
-        let coupled = timed(&mut solid.times.coupling, || flow.fluid.couple(input));
+        let coupled = timed(&mut data.times.coupling, || fluid.couple(input));
         Coupled(step, coupled, trial)
     }
 }
@@ -225,22 +184,22 @@ impl<'a> Coupled<'a> {
     /// lubrication load acts, walls included, or acted in the step before.
     pub fn resolve_contact(self) -> Resolved<'a> {
         let Coupled(mut step, coupled, trial) = self;
-        let solid = &mut step.solid;
-        let (grains, data, dt) = (&mut *solid.grains, &mut *solid.data, solid.dt);
+        let GrainContext { setup, data, dt, .. } = &mut step.solid;
+        let grains = &mut setup.grains;
         let pending = data.previous.iter().any(PreviousStep::has_pending_velocity);
         if data.contact.iter().all(Load::is_zero) && !pending {
-            solid.dynamics.accept(trial);
+            data.dynamics.accept(trial);
             for (end, grain) in data.ends.iter_mut().zip(grains) {
                 end.pose = grain.pose;
             }
             return Resolved(step, coupled);
         }
-        let added_density = solid.dynamics.params().added_density;
+        let added_density = data.dynamics.params().added_density;
         let (previous, responses) = (&data.previous, &mut data.responses);
-        coupled.responses(grains, previous, &data.contact, added_density, dt, responses);
-        timed(&mut solid.times.contact, || {
+        coupled.responses(grains, previous, &data.contact, added_density, *dt, responses);
+        timed(&mut data.times.contact, || {
             let (contact, ends) = (&mut data.contact, &mut data.ends);
-            (solid.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
+            (data.dynamics).resolve_with_response(trial, grains, &data.responses, contact, ends)
         });
         Resolved(step, coupled)
     }
@@ -250,19 +209,19 @@ impl<'a> Resolved<'a> {
     /// Gives the grains their new velocities and imposes them on the forced faces.
     pub fn impose_rigidity(self) -> Rigid<'a> {
         let Resolved(mut step, coupled) = self;
-        let Context { solid, flow } = &mut step;
-        let open_sides = &mut solid.open_sides;
+        let Context { solid: GrainContext { setup, data, dt, .. }, fluid } = &mut step;
+        let open_sides = &mut data.open_sides;
         let rigid = RigidityInput {
-            grains: solid.grains,
-            previous: &solid.data.previous,
-            contact: &solid.data.contact,
-            dt: solid.dt,
-            loads: solid.loads,
+            grains: &mut setup.grains,
+            previous: &data.previous,
+            contact: &data.contact,
+            dt: *dt,
+            loads: &mut data.loads,
             fluid_impulses: open_sides.as_mut().map_or(&mut [][..], |o| &mut o.fluid_impulses),
         };
-        timed(&mut solid.times.coupling, || flow.fluid.impose_rigidity(coupled, rigid));
+        timed(&mut data.times.coupling, || fluid.impose_rigidity(coupled, rigid));
         if let Some(open_sides) = open_sides {
-            flow.fluid.cover_boundary(&open_sides.covered_faces(solid.grains));
+            fluid.cover_boundary(&open_sides.covered_faces(&setup.grains));
         }
         Rigid(step)
     }
@@ -271,28 +230,27 @@ impl<'a> Resolved<'a> {
 impl<'a> Rigid<'a> {
     /// Projects the velocity onto the divergence-free fields.
     pub fn project(self) -> Projected<'a> {
-        let Rigid(mut context) = self;
-        let Context { solid, flow } = &mut context;
-        let momentum_before = flow.fluid.measures().momentum;
-        timed(&mut solid.times.project, || flow.fluid.project(solid.dt));
-        Projected { context, momentum_before }
+        let Rigid(Context { solid, fluid }) = self;
+        let momentum_before = fluid.measures().momentum;
+        timed(&mut solid.data.times.project, || fluid.project(solid.dt));
+        Projected { context: Context { solid, fluid }, momentum_before }
     }
 }
 
 impl Projected<'_> {
     /// Balances the momentum and records what the next step needs.
     pub fn finish(self) {
-        let Context { solid, flow } = self.context;
-        let (density, dt, data) = (flow.density, solid.dt, solid.data);
-        let gain = flow.fluid.measures().momentum - self.momentum_before;
-        let mut residual = density * (gain - flow.fluid.boundary_impulse(dt));
-        for (i, (grain, load)) in solid.grains.iter_mut().zip(&*solid.loads).enumerate() {
+        let Context { solid: GrainContext { setup, data, dt, .. }, fluid } = self.context;
+        let density = setup.fluid.map_or(0.0, |params| params.density);
+        let gain = fluid.measures().momentum - self.momentum_before;
+        let mut residual = density * (gain - fluid.boundary_impulse(dt));
+        for (i, (grain, load)) in setup.grains.iter_mut().zip(&data.loads).enumerate() {
             data.located[i] = grain.pose;
             grain.pose = data.ends[i].pose;
             let previous = &mut data.previous[i];
             let change = grain.rigid_velocity() - previous.velocity;
             // The fluid lost what it gave the grain, the displaced fluid included.
-            residual -= match solid.open_sides.as_deref().and_then(|o| o.impulse_across(i)) {
+            residual -= match data.open_sides.as_ref().and_then(|o| o.impulse_across(i)) {
                 None => density * grain.shape.volume() * change.linear - dt * load.force,
                 Some(impulse) => impulse,
             };
@@ -307,7 +265,7 @@ impl Projected<'_> {
                 ((change + taken_up) / dt, RigidVelocity::default())
             };
         }
-        *flow.momentum_residual = residual;
+        data.momentum_residual = residual;
     }
 }
 

@@ -7,9 +7,8 @@ use grainwake_formats::codec::{Decoder, Encoder, invalid};
 use glam::DVec3;
 
 use super::Simulation;
-
 use crate::grid::Mesh;
-use crate::math::{Load, Pose};
+use crate::math::{Load, Pose, RigidVelocity};
 
 /// Begins the state of grains at open sides of the box.
 const OPEN_SIDES: u64 = u64::from_le_bytes(*b"OPENSIDE");
@@ -25,40 +24,26 @@ impl Simulation {
         out.reals(&[self.clock.time, self.clock.last_step])?;
         out.u64(self.setup.grains.len() as u64)?;
         let grains = self.setup.grains.iter();
-        for ((grain, load), previous) in grains.zip(&self.loads).zip(&self.data.previous) {
-            out.vector(grain.pose.position)?;
-            out.quaternion(grain.pose.orientation)?;
-            for v in [
-                grain.velocity,
-                grain.angular_velocity,
-                load.force,
-                load.torque,
-                previous.acceleration.linear,
-                previous.acceleration.angular,
-                previous.pending_added_mass_velocity.linear,
-                previous.pending_added_mass_velocity.angular,
-                previous.added_mass_uptake.linear,
-                previous.added_mass_uptake.angular,
-            ] {
-                out.vector(v)?;
-            }
+        for ((grain, load), previous) in grains.zip(&self.data.loads).zip(&self.data.previous) {
+            save_pose(&grain.pose, &mut out)?;
+            save_rates(grain.rigid_velocity(), &mut out)?;
+            out.vector(load.force)?;
+            out.vector(load.torque)?;
+            save_rates(previous.acceleration, &mut out)?;
+            save_rates(previous.pending_added_mass_velocity, &mut out)?;
+            save_rates(previous.added_mass_uptake, &mut out)?;
         }
         if let Some(fluid) = &self.fluid {
-            out.vector(self.momentum_residual)?;
-            for pose in &self.data.located {
-                out.vector(pose.position)?;
-                out.quaternion(pose.orientation)?;
-            }
+            out.vector(self.data.momentum_residual)?;
+            self.data.located.iter().try_for_each(|pose| save_pose(pose, &mut out))?;
             fluid.save(&mut out)?;
         }
-        if let Some(open_sides) = &self.open_sides {
+        if let Some(open_sides) = &self.data.open_sides {
             out.u64(OPEN_SIDES)?;
-            for acceleration in &open_sides.earlier_accelerations {
-                out.vector(acceleration.linear)?;
-                out.vector(acceleration.angular)?;
-            }
+            let mut accelerations = open_sides.earlier_accelerations.iter();
+            accelerations.try_for_each(|acceleration| save_rates(*acceleration, &mut out))?;
         }
-        self.dynamics.save(writer)
+        self.data.dynamics.save(writer)
     }
 
     /// Restores a state written by [`Simulation::save`] from the same set-up.
@@ -72,47 +57,41 @@ impl Simulation {
         [self.clock.time, self.clock.last_step] = input.numbers()?;
         input.expect(self.setup.grains.len(), "grains")?;
         let grains = self.setup.grains.iter_mut();
-        for ((grain, load), previous) in grains.zip(&mut self.loads).zip(&mut self.data.previous) {
-            grain.pose.position = input.vector()?;
-            grain.pose.orientation = input.quaternion()?;
-            check_pose(&grain.pose, &self.setup.mesh)?;
+        let data = &mut self.data;
+        for ((grain, load), previous) in grains.zip(&mut data.loads).zip(&mut data.previous) {
+            grain.pose = restore_pose(&mut input, &self.setup.mesh)?;
             grain.velocity = input.vector()?;
             grain.angular_velocity = input.vector()?;
             if grain.has_left() {
                 grain.leave();
             }
             *load = Load { force: input.vector()?, torque: input.vector()? };
-            let pending = &mut previous.pending_added_mass_velocity;
-            for rates in [&mut previous.acceleration, pending, &mut previous.added_mass_uptake] {
-                rates.linear = input.vector()?;
-                rates.angular = input.vector()?;
-            }
+            previous.acceleration = restore_rates(&mut input)?;
+            previous.pending_added_mass_velocity = restore_rates(&mut input)?;
+            previous.added_mass_uptake = restore_rates(&mut input)?;
         }
         if let Some(fluid) = &mut self.fluid {
-            self.momentum_residual = input.vector()?;
+            data.momentum_residual = input.vector()?;
             // Faces are found at the poses before contact was resolved.
             let mut grains = self.setup.grains.clone();
-            for (grain, pose) in grains.iter_mut().zip(&mut self.data.located) {
-                pose.position = input.vector()?;
-                pose.orientation = input.quaternion()?;
-                check_pose(pose, &self.setup.mesh)?;
+            for (grain, pose) in grains.iter_mut().zip(&mut data.located) {
+                *pose = restore_pose(&mut input, &self.setup.mesh)?;
                 grain.pose = *pose;
             }
             fluid.restore(&mut input, self.clock.last_step)?;
             fluid.locate(&grains);
         }
-        if let Some(open_sides) = &mut self.open_sides {
+        if let Some(open_sides) = &mut data.open_sides {
             if input.u64()? != OPEN_SIDES {
                 return Err(invalid(
                     "it was written by a version without grains that leave the box",
                 ));
             }
             for acceleration in &mut open_sides.earlier_accelerations {
-                acceleration.linear = input.vector()?;
-                acceleration.angular = input.vector()?;
+                *acceleration = restore_rates(&mut input)?;
             }
         }
-        self.dynamics.restore(reader)
+        data.dynamics.restore(reader)
     }
 }
 
@@ -120,8 +99,15 @@ impl Simulation {
 /// periodic boxes are not wrapped.
 const FAR: f64 = 1e6;
 
-/// Refuses a pose that no simulation reaches. Locating it would take any amount of memory.
-fn check_pose(pose: &Pose, mesh: &Mesh) -> io::Result<()> {
+fn save_pose(pose: &Pose, out: &mut Encoder) -> io::Result<()> {
+    out.vector(pose.position)?;
+    out.quaternion(pose.orientation)
+}
+
+/// Reads a pose. One that no simulation reaches is refused, since locating it would take any amount
+/// of memory.
+fn restore_pose(input: &mut Decoder, mesh: &Mesh) -> io::Result<Pose> {
+    let pose = Pose { position: input.vector()?, orientation: input.quaternion()? };
     let distance = (pose.position - mesh.origin).length();
     let left = pose.position.cmpeq(DVec3::INFINITY).all();
     let near = distance < FAR * mesh.extent().length();
@@ -131,5 +117,14 @@ fn check_pose(pose: &Pose, mesh: &Mesh) -> io::Result<()> {
     if !pose.orientation.is_normalized() {
         return Err(invalid(format!("the quaternion {} has no unit length", pose.orientation)));
     }
-    Ok(())
+    Ok(pose)
+}
+
+fn save_rates(rates: RigidVelocity, out: &mut Encoder) -> io::Result<()> {
+    out.vector(rates.linear)?;
+    out.vector(rates.angular)
+}
+
+fn restore_rates(input: &mut Decoder) -> io::Result<RigidVelocity> {
+    Ok(RigidVelocity { linear: input.vector()?, angular: input.vector()? })
 }

@@ -25,7 +25,7 @@ impl Simulation {
     /// passes: right-hand side and forward transforms, tridiagonal columns, inverse transforms and
     /// correction, ghost cells and sums. Without fluid, contact is the only pass.
     pub fn pass_times(&self) -> Vec<(&'static str, TimeSpent)> {
-        let times = &self.times;
+        let times = &self.data.times;
         let Some(fluid) = &self.fluid else {
             return vec![("contact", times.contact)];
         };
