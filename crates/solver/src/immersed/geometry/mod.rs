@@ -45,6 +45,11 @@ pub fn narrow_band_bytes(mesh: &Mesh, shape: &Shape) -> f64 {
     BandSamples::expected_bytes(shape, half_width_and_reach(mesh))
 }
 
+/// Fraction of the size of two grains below which their distances from a face count as equal, since
+/// distances are in single precision. Exactly one of two grains, or of two periodic images, at
+/// equal distance from a face must be the nearest.
+const TIE: f64 = 1e-6;
+
 /// Geometry of all grains on one grid.
 pub struct Locator {
     mesh: Mesh,
@@ -54,7 +59,15 @@ pub struct Locator {
     /// Distance from the surface up to which a grain affects faces [m].
     reach: f64,
     shapes: NarrowBandShapes,
-    neighbours: NeighbourSearch,
+    search: BroadPhase,
+    spheres: Vec<BoundingSphere>,
+    /// Both directions of all pairs: grain, other grain, and periods between the image of the
+    /// other grain and its own position, along z first. Sorted in this order.
+    pairs: Vec<(usize, usize, [i32; 3])>,
+    /// Neighbours of grain 0, then of grain 1, ...
+    neighbours: Vec<NeighbourGrain>,
+    /// Entry of the first neighbour of each grain; one entry more at the end.
+    first_neighbour: Vec<usize>,
 }
 
 impl Locator {
@@ -67,7 +80,11 @@ impl Locator {
             eps,
             reach,
             shapes: NarrowBandShapes::new(grains, [eps, reach], mesh.resolved_axes().count()),
-            neighbours: NeighbourSearch::default(),
+            search: BroadPhase::default(),
+            spheres: Vec::new(),
+            pairs: Vec::new(),
+            neighbours: Vec::new(),
+            first_neighbour: Vec::new(),
         }
     }
 
@@ -97,15 +114,60 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds the neighbours of all grains, before [`Locator::locate`]. `displacement(i)` [m] is the
-    /// distance of grain i from its last pose, whose faces count as well; 0 if they do not.
+    /// Finds the neighbours of all grains, before [`Locator::locate`]: grains whose spheres overlap.
+    /// A sphere contains all faces within reach of the surface of grain i, and `displacement(i)`
+    /// [m] extends it to the last pose of the grain, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
-        self.neighbours.update(&self.mesh, self.periodic, self.reach, grains, displacement);
+        let mesh = &self.mesh;
+        let enclosure = Enclosure {
+            lower: mesh.origin,
+            upper: mesh.upper(),
+            periodic: [0, 1, 2].map(|axis| self.periodic[axis] && mesh.is_resolved(axis)),
+            sides: Default::default(),
+        };
+        let size = |grain: &Grain| grain.shape.bounding_radius() + self.reach;
+        self.spheres.clear();
+        let spheres = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {
+            centre: grain.pose.position,
+            radius: size(grain) + displacement(index),
+        });
+        self.spheres.extend(spheres);
+        self.search.search(&self.spheres, &enclosure);
+        self.pairs.clear();
+        for pair in &self.search.pairs {
+            let Partner::Grain(other) = pair.partner else {
+                continue;
+            };
+            let (grain, [x, y, z]) = (pair.grain as usize, pair.image);
+            for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
+                self.pairs.push((grain, other, [z, y, x].map(|periods| sign * periods)));
+            }
+        }
+        self.pairs.sort_unstable();
+        self.neighbours.clear();
+        self.first_neighbour.clear();
+        for &(index, other, [z, y, x]) in &self.pairs {
+            let (entry, grain) = (self.neighbours.len(), &grains[other]);
+            self.first_neighbour.resize(self.first_neighbour.len().max(index + 1), entry);
+            let tie = TIE * (size(&grains[index]) + size(grain));
+            self.neighbours.push(NeighbourGrain {
+                grain: other,
+                pose: grain.pose,
+                bounding_radius: grain.shape.bounding_radius(),
+                shift: DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * mesh.extent(),
+                tie_breaker: match other == index {
+                    true if [x, y, z] > [0; 3] => -tie,
+                    false if other < index => -tie,
+                    _ => tie,
+                },
+            });
+        }
+        self.first_neighbour.resize(grains.len() + 1, self.neighbours.len());
     }
 
-    /// Neighbours of grain `index`.
+    /// Neighbours of grain `index`, sorted by index and image.
     pub fn neighbours(&self, index: usize) -> &[NeighbourGrain] {
-        self.neighbours.of(index)
+        &self.neighbours[self.first_neighbour[index]..self.first_neighbour[index + 1]]
     }
 
     /// Locates grain `index`: lists the faces within reach in `body`, and those in the forcing band
@@ -150,96 +212,10 @@ impl Locator {
     }
 }
 
-/// Fraction of the size of two grains below which their distances from a face count as equal, since
-/// distances are in single precision. Exactly one of two grains, or of two periodic images, at
-/// equal distance from a face must be the nearest.
-const TIE: f64 = 1e-6;
-
-/// Lists of the neighbours of all grains, found with the broad phase of the contact search.
-#[derive(Default)]
-pub struct NeighbourSearch {
-    search: BroadPhase,
-    spheres: Vec<BoundingSphere>,
-    /// Both directions of all pairs: grain, other grain, and periods between the image of the
-    /// other grain and its own position, along z first. Sorted in this order.
-    pairs: Vec<(usize, usize, [i32; 3])>,
-    /// Neighbours of grain 0, then of grain 1, ...
-    neighbours: Vec<NeighbourGrain>,
-    /// Entry of the first neighbour of each grain; one entry more at the end.
-    first: Vec<usize>,
-}
-
-impl NeighbourSearch {
-    /// Finds the pairs whose spheres overlap. A sphere contains all faces within `reach` [m] of the
-    /// surface of grain i, and `displacement(i)` [m] extends it to the last pose of the grain.
-    pub fn update(
-        &mut self,
-        mesh: &Mesh,
-        periodic: [bool; 3],
-        reach: f64,
-        grains: &[Grain],
-        displacement: impl Fn(usize) -> f64,
-    ) {
-        let enclosure = Enclosure {
-            lower: mesh.origin,
-            upper: mesh.upper(),
-            periodic: [0, 1, 2].map(|axis| periodic[axis] && mesh.is_resolved(axis)),
-            sides: Default::default(),
-        };
-        self.spheres.clear();
-        let spheres = grains.iter().enumerate().map(|(index, grain)| BoundingSphere {
-            centre: grain.pose.position,
-            radius: grain.shape.bounding_radius() + reach + displacement(index),
-        });
-        self.spheres.extend(spheres);
-        self.search.search(&self.spheres, &enclosure);
-        self.pairs.clear();
-        for pair in &self.search.pairs {
-            let Partner::Grain(other) = pair.partner else {
-                continue;
-            };
-            let (grain, [x, y, z]) = (pair.grain as usize, pair.image);
-            for (grain, other, sign) in [(grain, other, 1), (other, grain, -1)] {
-                self.pairs.push((grain, other, [z, y, x].map(|periods| sign * periods)));
-            }
-        }
-        self.pairs.sort_unstable();
-        self.list(mesh, reach, grains);
-    }
-
-    /// Fills the list of neighbours from the sorted pairs.
-    fn list(&mut self, mesh: &Mesh, reach: f64, grains: &[Grain]) {
-        self.neighbours.clear();
-        self.first.clear();
-        let size = |index: usize| grains[index].shape.bounding_radius() + reach;
-        for &(index, other, [z, y, x]) in &self.pairs {
-            let entry = self.neighbours.len();
-            self.first.resize(self.first.len().max(index + 1), entry);
-            let tie = TIE * (size(index) + size(other));
-            self.neighbours.push(NeighbourGrain {
-                grain: other,
-                pose: grains[other].pose,
-                bounding_radius: grains[other].shape.bounding_radius(),
-                shift: DVec3::new(f64::from(x), f64::from(y), f64::from(z)) * mesh.extent(),
-                tie_breaker: match other == index {
-                    true if [x, y, z] > [0; 3] => -tie,
-                    false if other < index => -tie,
-                    _ => tie,
-                },
-            });
-        }
-        self.first.resize(grains.len() + 1, self.neighbours.len());
-    }
-
-    /// Neighbours of grain `index`, sorted by index and image.
-    pub fn of(&self, index: usize) -> &[NeighbourGrain] {
-        &self.neighbours[self.first[index]..self.first[index + 1]]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flow::Boundary;
     use grainwake_shape::Shape;
     use std::sync::Arc;
 
@@ -254,31 +230,36 @@ mod tests {
         // The first and the last are 1.1 apart across x; the second has no neighbours.
         let at = |x: f64| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, 2.0));
         let grains = [at(-0.5), at(3.0), at(6.4)];
-        let mut search = NeighbourSearch::default();
-        let found = |search: &NeighbourSearch, index| -> Vec<(DVec3, f64)> {
-            let neighbours = search.of(index).iter();
+        let periodic = Boundaries([[Boundary::Periodic; 2]; 3]);
+        let mut locator = Locator { reach: 0.6, ..Locator::new(&mesh, &periodic, &grains) };
+        let found = |locator: &Locator, index| -> Vec<(DVec3, f64)> {
+            let neighbours = locator.neighbours(index).iter();
             neighbours.map(|n| (n.shift, n.tie_breaker)).collect()
         };
-        search.update(&mesh, [true; 3], 0.6, &grains, |_| 0.0);
+        locator.find_neighbours(&grains, |_| 0.0);
         let tie = 2.2 * TIE;
         let along_x = DVec3::new(8.0, 0.0, 0.0);
-        assert_eq!(found(&search, 0), [(-along_x, tie)]);
-        assert_eq!(found(&search, 1), []);
-        assert_eq!(found(&search, 2), [(along_x, -tie)]);
-        assert_eq!([0, 1, 2].map(|index| search.of(index).is_empty()), [false, true, false]);
+        assert_eq!(found(&locator, 0), [(-along_x, tie)]);
+        assert_eq!(found(&locator, 1), []);
+        assert_eq!(found(&locator, 2), [(along_x, -tie)]);
+        assert_eq!(
+            [0, 1, 2].map(|index| locator.neighbours(index).is_empty()),
+            [false, true, false]
+        );
         // The second is 3.4 from the third, both with a reach of 1.1, and moved by 1.25.
-        search.update(&mesh, [true; 3], 0.6, &grains, |index| [0.0, 1.25, 0.0][index]);
-        assert!(!search.of(1).is_empty());
-        let others = found(&search, 1).into_iter();
+        locator.find_neighbours(&grains, |index| [0.0, 1.25, 0.0][index]);
+        assert!(!locator.neighbours(1).is_empty());
+        let others = found(&locator, 1).into_iter();
         let others = others.filter(|(shift, _)| *shift == DVec3::ZERO);
         assert_eq!(others.count(), 1, "the others are its own images");
-        assert_eq!(found(&search, 0), [(-along_x, tie)]);
+        assert_eq!(found(&locator, 0), [(-along_x, tie)]);
         // With a reach of more than half a period a grain neighbours its own images.
-        search.update(&mesh, [true; 3], 1.6, &grains[1..2], |_| 0.0);
+        locator.reach = 1.6;
+        locator.find_neighbours(&grains[1..2], |_| 0.0);
         let tie = 4.2 * TIE;
         let along_y = DVec3::new(0.0, 4.0, 0.0);
         let along_z = DVec3::new(0.0, 0.0, 4.0);
         let images = [(-along_z, tie), (-along_y, tie), (along_y, -tie), (along_z, -tie)];
-        assert_eq!(found(&search, 0), images);
+        assert_eq!(found(&locator, 0), images);
     }
 }
