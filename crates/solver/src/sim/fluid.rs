@@ -104,11 +104,11 @@ impl<R: Real> FluidOf<R> {
 
     /// Moves the refined box if it no longer holds the grains and their margins.
     fn follow_grains(&mut self) {
-        let Some(present) = self.flow.refined_box() else { return };
+        let present @ Some(_) = self.flow.refined_box() else { return };
         let whole = &self.flow.whole;
         let (mesh, boundaries) = (whole.mesh(), whole.boundaries());
-        let place = refinement::next_box(mesh, boundaries, &self.followed, present);
-        if place != present {
+        let place = refinement::box_around(mesh, boundaries, &self.followed, present);
+        if let Some(place) = place.filter(|place| Some(*place) != present) {
             self.flow.refine(place);
             self.grains.move_to_grid(self.flow.finest(), &self.followed);
         }

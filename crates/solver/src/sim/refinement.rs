@@ -19,25 +19,6 @@ const EXCESS: usize = 8;
 /// Largest distance of a refined box from the origin along a periodic axis [cells].
 const FAR: usize = 1 << 40;
 
-/// Refined box around grains; none without grains.
-pub fn first_box(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Option<RefinedBox> {
-    Some(place(mesh, boundaries, needed_range(mesh, grains)?, None))
-}
-
-/// Refined box for grains at their present poses, which is the `present` one as long as it holds
-/// all of them.
-pub fn next_box(
-    mesh: &Mesh,
-    boundaries: &Boundaries,
-    grains: &[Grain],
-    present: RefinedBox,
-) -> RefinedBox {
-    match needed_range(mesh, grains) {
-        Some(needed) => place(mesh, boundaries, needed, Some(present)),
-        None => present,
-    }
-}
-
 /// Returns whether a refined box fits into the grid; that of a damaged checkpoint may not.
 pub fn is_possible(mesh: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> bool {
     (0..3).all(|axis| {
@@ -64,14 +45,16 @@ fn needed_range(mesh: &Mesh, grains: &[Grain]) -> Option<[DVec3; 2]> {
     ranges.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)])
 }
 
-/// Refined box that holds a range of cells: the `present` one along each axis where it suffices and
-/// is not far too large, else a new one with the range in its middle.
-fn place(
+/// Refined box around grains at their present poses; none if all have left. It is the `present` box
+/// along each axis where that holds the grains and is not far too large, else a new one with the
+/// grains in its middle.
+pub fn box_around(
     mesh: &Mesh,
     boundaries: &Boundaries,
-    [low, high]: [DVec3; 2],
+    grains: &[Grain],
     present: Option<RefinedBox>,
-) -> RefinedBox {
+) -> Option<RefinedBox> {
+    let [low, high] = needed_range(mesh, grains)?;
     let mut result = RefinedBox { corner: [0; 3], cells: mesh.cells };
     for axis in 0..3 {
         let (n, periodic) = (mesh.cells[axis], boundaries.is_periodic(axis));
@@ -101,7 +84,7 @@ fn place(
         result.cells[axis] = cells;
         result.corner[axis] = if periodic { corner } else { corner.clamp(0, last) };
     }
-    result
+    Some(result)
 }
 
 /// Smallest count from `count` on without prime factors beyond 5, for which transforms are fast.
@@ -126,8 +109,7 @@ mod tests {
             .iter()
             .map(|x| Grain::new(shape.clone(), 1.5).with_position(DVec3::from_array(*x)))
             .collect();
-        let needed = needed_range(&MESH, &grains).unwrap();
-        place(&MESH, &Boundaries([[side; 2]; 3]), needed, present)
+        box_around(&MESH, &Boundaries([[side; 2]; 3]), &grains, present).unwrap()
     }
 
     #[test]

@@ -163,7 +163,7 @@ impl Setup {
     /// Refined box around the present grains, if the set-up has one.
     pub(super) fn refined_box(&self) -> Option<RefinedBox> {
         let is_refined = self.refinement > 1 && self.fluid.is_some();
-        let place = || refinement::first_box(&self.mesh, &self.boundaries, &self.grains);
+        let place = || refinement::box_around(&self.mesh, &self.boundaries, &self.grains, None);
         is_refined.then(place).flatten()
     }
 
