@@ -93,14 +93,9 @@ impl EventParams {
         let rise = free.peek().is_some() && free.all(|grain| grain.density < fluid_density);
         let down = gravity.try_normalize().unwrap_or(DVec3::NEG_Z);
         let down = if rise && gravity != DVec3::ZERO { -down } else { down };
-        let magnitude = down.abs();
-        let axis = if magnitude.z >= magnitude.x && magnitude.z >= magnitude.y {
-            2
-        } else if magnitude.y >= magnitude.x {
-            1
-        } else {
-            0
-        };
+        // Of equal components the last one counts.
+        let along = |axis: usize| down[axis].abs();
+        let axis = (0..3).max_by(|a, b| along(*a).total_cmp(&along(*b))).unwrap_or(2);
         let d = grains.iter().map(|g| g.shape.equivalent_diameter()).sum::<f64>()
             / grains.len().max(1) as f64;
         let g = gravity.length();

@@ -22,16 +22,6 @@ pub(super) struct Pair {
     tilt: f64,
 }
 
-/// Positions of a pair after a step.
-#[derive(Clone, Copy)]
-pub(super) struct Encounter {
-    /// From the centroid of the first grain to the nearest image of the second [m].
-    pub line: DVec3,
-    pub touching: bool,
-    /// Gap between the surfaces [m].
-    pub gap: f64,
-}
-
 impl Pair {
     /// Pair at the start of a run.
     pub fn new(params: &EventParams, line: DVec3, gap: f64) -> Pair {
@@ -45,18 +35,20 @@ impl Pair {
         }
     }
 
-    /// Updates the pair after a step and returns its events; roles are fixed once a grain has
-    /// landed.
+    /// Updates the pair after a step and returns its events. `line` leads from the centroid of the
+    /// first grain to the nearest image of the second [m], `gap` is the distance of the surfaces
+    /// [m]; roles are fixed once a grain has `landed`.
     pub fn update(
         &mut self,
         params: &EventParams,
         time: f64,
-        now: Encounter,
+        (line, gap): (DVec3, f64),
+        touching: bool,
         landed: bool,
     ) -> Vec<Event> {
-        (self.gap, self.tilt) = (now.gap, params.tilt(now.line));
-        let role_change = self.update_roles(params, time, now.line, landed);
-        let change = self.update_phase(params, time, now.touching);
+        (self.gap, self.tilt) = (gap, params.tilt(line));
+        let role_change = self.update_roles(params, time, line, landed);
+        let change = self.update_phase(params, time, touching);
         let events = role_change.into_iter().chain(change);
         let events = events.map(|(kind, at)| Event {
             time: at,

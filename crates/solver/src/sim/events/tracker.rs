@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::pair::{Encounter, Pair};
+use super::pair::Pair;
 use super::{Event, EventKind, EventParams, Phase, StopWhen};
 use crate::dem::{Contact, Grain, MotionConstraint, Partner};
 
@@ -59,13 +59,10 @@ impl Tracker {
                 let pair = (contact.grain, contact.partner);
                 matches!(pair, (0, Partner::Grain(1)) | (1, Partner::Grain(0)))
             };
-            let now = Encounter {
-                line: self.params.line_of_centres(a, b),
-                touching: contacts.iter().any(of_pair) || gap <= 0.0,
-                gap,
-            };
+            let line = self.params.line_of_centres(a, b);
+            let touching = contacts.iter().any(of_pair) || gap <= 0.0;
             let landed = self.state.landed.iter().any(Option::is_some);
-            let events = pair.update(&self.params, time, now, landed);
+            let events = pair.update(&self.params, time, (line, gap), touching, landed);
             self.state.events.extend(events);
         }
         self.update_landing(time, contacts);
@@ -106,14 +103,11 @@ impl Tracker {
                 supported[other] = true;
             }
         }
-        let still = grains
-            .iter()
-            .zip(supported)
-            .filter(|(g, _)| g.translation == MotionConstraint::Free && !g.has_left())
-            .all(|(g, supported)| {
-                let spin = g.angular_velocity.length() * g.shape.bounding_radius();
-                supported && g.velocity.length() + spin < self.params.rest_speed
-            });
+        let mut free = grains.iter().zip(supported).filter(|(grain, _)| may_settle(grain));
+        let still = free.all(|(grain, supported)| {
+            let spin = grain.angular_velocity.length() * grain.shape.bounding_radius();
+            supported && grain.velocity.length() + spin < self.params.rest_speed
+        });
         self.state.still_since = if still { self.state.still_since.or(Some(time)) } else { None };
     }
 
@@ -121,13 +115,8 @@ impl Tracker {
     pub fn holds_since(&self, when: StopWhen, grains: &[Grain]) -> Option<f64> {
         match when {
             StopWhen::Landing => {
-                let mut free = self
-                    .state
-                    .landed
-                    .iter()
-                    .zip(grains)
-                    .filter(|(_, g)| g.translation == MotionConstraint::Free && !g.has_left())
-                    .peekable();
+                let landed = self.state.landed.iter().zip(grains);
+                let mut free = landed.filter(|(_, grain)| may_settle(grain)).peekable();
                 free.peek()?;
                 free.try_fold(0.0_f64, |last, (landed, _)| landed.map(|t| last.max(t)))
             }
@@ -165,12 +154,8 @@ impl Tracker {
     }
     /// Last separation of the pair; none while it is in contact [s].
     pub fn separation_time(&self) -> Option<f64> {
-        let last = self
-            .state
-            .events
-            .iter()
-            .rev()
-            .find(|e| matches!(e.kind, EventKind::Separation | EventKind::Kiss))?;
+        let decides = |e: &&Event| matches!(e.kind, EventKind::Separation | EventKind::Kiss);
+        let last = self.state.events.iter().rev().find(decides)?;
         (last.kind == EventKind::Separation).then_some(last.time)
     }
     /// Number of role changes.
@@ -197,4 +182,9 @@ impl Tracker {
     pub fn restore(&mut self, state: TrackerState) {
         self.state = state;
     }
+}
+
+/// Returns whether a grain moves freely in the box.
+fn may_settle(grain: &Grain) -> bool {
+    grain.translation == MotionConstraint::Free && !grain.has_left()
 }
