@@ -59,8 +59,11 @@ impl Simulation {
         let mesh = &self.setup.mesh;
         let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
         let volume_flux = mesh.spacing[a] * mesh.spacing[b] * self.face_sum(axis, at)?;
-        let solid = self.solid_faces(normal, at);
-        let count = (mesh.cells[a] * mesh.cells[b]) as f64;
+        let count = mesh.cells[a] * mesh.cells[b];
+        let mut solid = SolidFaces { fraction: vec![0.0; count], flux: 0.0 };
+        for grain in self.setup.grains.iter().filter(|grain| !grain.has_left()) {
+            self.add_cross_section(&mut solid, grain, normal, at);
+        }
         let grid = self.sampled_grid();
         let (mut solid_sum, mut pressure_sum) = (0.0, 0.0);
         let mut x = mesh.position([0.5; 3], [1; 3]);
@@ -77,8 +80,8 @@ impl Simulation {
         Some(PlaneSample {
             volume_flux,
             grain_flux: solid.flux,
-            solid_fraction: solid_sum / count,
-            pressure: pressure_sum / (count - solid_sum),
+            solid_fraction: solid_sum / count as f64,
+            pressure: pressure_sum / (count as f64 - solid_sum),
         })
     }
 
@@ -101,14 +104,10 @@ impl Simulation {
             let along = 2 - normal;
             shape[along] = 1;
             let mut sum = 0.0;
-            for k in 0..shape[0] {
-                for j in 0..shape[1] {
-                    for i in 0..shape[2] {
-                        let mut entry = [k, j, i];
-                        entry[along] = index;
-                        sum += view.get(entry);
-                    }
-                }
+            for n in 0..shape.iter().product() {
+                let mut entry = [n / (shape[1] * shape[2]), n / shape[2] % shape[1], n % shape[2]];
+                entry[along] = index;
+                sum += view.get(entry);
             }
             sum
         };
@@ -117,22 +116,8 @@ impl Simulation {
             return Some(layer(nearest as usize));
         }
         let below = s.floor();
-        Some(
-            layer(below as usize)
-                + (s - below) * (layer(below as usize + 1) - layer(below as usize)),
-        )
-    }
-
-    /// Solid fraction of each face cell of a plane, and the volume of grains that crosses it.
-    fn solid_faces(&self, normal: usize, at: f64) -> SolidFaces {
-        let mesh = &self.setup.mesh;
-        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
-        let cells = [mesh.cells[a], mesh.cells[b]];
-        let mut faces = SolidFaces { fraction: vec![0.0; cells[0] * cells[1]], flux: 0.0 };
-        for grain in self.setup.grains.iter().filter(|grain| !grain.has_left()) {
-            self.add_cross_section(&mut faces, grain, normal, at);
-        }
-        faces
+        let [low, high] = [0, 1].map(|n| layer(below as usize + n));
+        Some(low + (s - below) * (high - low))
     }
 
     /// Adds the cross-section of a grain and of its periodic images with a plane.

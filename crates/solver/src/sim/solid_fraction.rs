@@ -18,11 +18,10 @@ impl Simulation {
         let edge = DVec3::from_array(
             [0, 1, 2].map(|axis| if mesh.is_resolved(axis) { mesh.spacing[axis] } else { 0.0 }),
         );
-        let near = match self.grains_near(cell, edge) {
-            Near::Inside => return 1.0,
-            Near::Cut(near) if near.is_empty() => return 0.0,
-            Near::Cut(near) => near,
-        };
+        let Some(near) = self.grains_near(cell, edge) else { return 1.0 };
+        if near.is_empty() {
+            return 0.0;
+        }
         let subcell = edge / DVec3::from_array(counts.map(|n| n as f64));
         let thinnest = (0..3)
             .filter(|axis| subcell[*axis] > 0.0)
@@ -48,8 +47,9 @@ impl Simulation {
         sum / counts.iter().product::<usize>() as f64
     }
 
-    /// Grains whose surface may cut a cell with these edges [m].
-    fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Near<'_> {
+    /// Grains whose surface may cut a cell with these edges [m], with the vector from centroid to
+    /// cell centre [m]; `None` if the cell lies inside a grain.
+    fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Option<Vec<(&Grain, DVec3)>> {
         let mesh = &self.setup.mesh;
         let centre = mesh.position([0.5; 3], cell.map(|i| i + 1));
         let extent = mesh.extent();
@@ -69,20 +69,12 @@ impl Simulation {
             let (distance, _) = grain.shape.distance_and_gradient(to_body * lever_arm);
             // From the centre to a corner, the distance changes by at most half the diagonal.
             if distance <= -0.5 * edge.length() {
-                return Near::Inside;
+                return None;
             }
             if distance < 0.5 * edge.length() {
                 near.push((grain, lever_arm));
             }
         }
-        Near::Cut(near)
+        Some(near)
     }
-}
-
-/// Position of a cell relative to the grains.
-enum Near<'a> {
-    /// The cell lies inside a grain.
-    Inside,
-    /// Grains that may cut the cell, with the vector from centroid to cell centre [m].
-    Cut(Vec<(&'a Grain, DVec3)>),
 }
