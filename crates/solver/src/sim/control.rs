@@ -62,16 +62,11 @@ impl MotionComponent {
             MotionComponent::Rotation => "angular velocity",
         }
     }
-    fn constraint(self, grain: &mut Grain) -> &mut MotionConstraint {
+    /// Constraint and present velocity of a grain.
+    fn of(self, grain: &mut Grain) -> (&mut MotionConstraint, &mut DVec3) {
         match self {
-            MotionComponent::Translation => &mut grain.translation,
-            MotionComponent::Rotation => &mut grain.rotation,
-        }
-    }
-    fn velocity(self, grain: &mut Grain) -> &mut DVec3 {
-        match self {
-            MotionComponent::Translation => &mut grain.velocity,
-            MotionComponent::Rotation => &mut grain.angular_velocity,
+            MotionComponent::Translation => (&mut grain.translation, &mut grain.velocity),
+            MotionComponent::Rotation => (&mut grain.rotation, &mut grain.angular_velocity),
         }
     }
 }
@@ -89,9 +84,9 @@ impl Simulation {
         component: MotionComponent,
         velocity: DVec3,
     ) -> Result<(), ControlError> {
-        self.check_control(grain, velocity.is_finite(), component.quantity())?;
         let quantity = component.quantity();
-        if *component.constraint(&mut self.setup.grains[grain]) != MotionConstraint::Free {
+        self.check_control(grain, velocity.is_finite(), quantity)?;
+        if *component.of(&mut self.setup.grains[grain]).0 != MotionConstraint::Free {
             return Err(ControlError::Prescribed { grain, quantity });
         }
         self.replace_velocity(grain, component, velocity);
@@ -100,7 +95,7 @@ impl Simulation {
 
     /// Replaces a velocity. The added mass takes up no part of the new one.
     fn replace_velocity(&mut self, grain: usize, component: MotionComponent, velocity: DVec3) {
-        *component.velocity(&mut self.setup.grains[grain]) = velocity;
+        *component.of(&mut self.setup.grains[grain]).1 = velocity;
         let pending = &mut self.data.previous[grain].pending_added_mass_velocity;
         match component {
             MotionComponent::Translation => pending.linear = DVec3::ZERO,
@@ -121,7 +116,7 @@ impl Simulation {
     ) -> Result<(), ControlError> {
         self.check_control(grain, velocity.is_finite(), component.quantity())?;
         self.remove_formula(grain, component);
-        let constraint = component.constraint(&mut self.setup.grains[grain]);
+        let (constraint, _) = component.of(&mut self.setup.grains[grain]);
         *constraint = MotionConstraint::Prescribed(velocity);
         self.replace_velocity(grain, component, velocity);
         Ok(())
@@ -139,7 +134,7 @@ impl Simulation {
     ) -> Result<(), ControlError> {
         self.check_control(grain, true, component.quantity())?;
         self.remove_formula(grain, component);
-        *component.constraint(&mut self.setup.grains[grain]) = MotionConstraint::Free;
+        *component.of(&mut self.setup.grains[grain]).0 = MotionConstraint::Free;
         Ok(())
     }
 

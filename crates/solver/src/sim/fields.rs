@@ -83,33 +83,25 @@ impl CellField {
     pub fn at(&self, sim: &Simulation, cell: [usize; 3]) -> DVec3 {
         (self.value)(sim, cell)
     }
-
-    const fn vector(
-        name: &'static str,
-        unit: &'static str,
-        value: fn(&Simulation, [usize; 3]) -> DVec3,
-    ) -> CellField {
-        CellField { name, unit, components: 3, value }
-    }
-
-    const fn scalar(
-        name: &'static str,
-        unit: &'static str,
-        value: fn(&Simulation, [usize; 3]) -> DVec3,
-    ) -> CellField {
-        CellField { name, unit, components: 1, value }
-    }
 }
 
 /// Fields written to slices and field files, in the order of the files. A further field needs an
 /// entry here with its function, and a row in `docs/reference/run-folder.md`.
 pub static CELL_FIELDS: &[CellField] = &[
-    CellField::vector("velocity", "m/s", Simulation::velocity_at),
-    CellField::vector("vorticity", "1/s", Simulation::vorticity_at),
-    CellField::scalar("pressure", "Pa", |sim, cell| DVec3::new(sim.pressure_at(cell), 0.0, 0.0)),
-    CellField::scalar("solid_fraction", "1", |sim, cell| {
-        DVec3::new(sim.solid_fraction_at(cell), 0.0, 0.0)
-    }),
+    CellField { name: "velocity", unit: "m/s", components: 3, value: Simulation::velocity_at },
+    CellField { name: "vorticity", unit: "1/s", components: 3, value: Simulation::vorticity_at },
+    CellField {
+        name: "pressure",
+        unit: "Pa",
+        components: 1,
+        value: |sim, cell| DVec3::new(sim.pressure_at(cell), 0.0, 0.0),
+    },
+    CellField {
+        name: "solid_fraction",
+        unit: "1",
+        components: 1,
+        value: |sim, cell| DVec3::new(sim.solid_fraction_at(cell), 0.0, 0.0),
+    },
 ];
 
 impl Simulation {
