@@ -198,8 +198,7 @@ impl Setup {
     /// [`SetupError::Inconsistent`] names the contradiction.
     pub fn validate(&self) -> Result<(), SetupError> {
         let fail = |message: String| Err(SetupError::Inconsistent(message));
-        let open = |side: &Boundary| matches!(side, Boundary::Outflow);
-        let flux = |side: &Boundary| matches!(side, Boundary::Inflow { .. });
+        let fluid_enters = |side: &Boundary| matches!(side, Boundary::Inflow { .. });
         let sides = || self.boundaries.0.iter().flatten();
         for (axis, [lower, upper]) in self.boundaries.0.iter().enumerate() {
             let name = ["x", "y", "z"][axis];
@@ -212,7 +211,7 @@ impl Setup {
                 ));
             }
         }
-        if sides().any(flux) && !sides().any(open) {
+        if sides().any(fluid_enters) && !sides().any(|side| *side == Boundary::Outflow) {
             return fail(
                 "fluid enters the box but no side lets it out: make one side an outflow".into(),
             );
@@ -223,10 +222,8 @@ impl Setup {
                 "the grid needs at least one cell of positive size along each axis".into(),
             );
         }
-        if self
-            .fluid
-            .is_some_and(|fluid| !bounded(fluid.density) || !bounded(fluid.kinematic_viscosity))
-        {
+        let is_fluid = |p: FluidParams| bounded(p.density) && bounded(p.kinematic_viscosity);
+        if !self.fluid.is_none_or(is_fluid) {
             return fail("density and viscosity of the fluid must be positive".into());
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
@@ -244,10 +241,8 @@ impl Setup {
         }
         let motions = &self.prescription.motions;
         if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {
-            return fail(format!(
-                "a motion is given for grain {}, which is not there",
-                motion.grain
-            ));
+            let grain = motion.grain;
+            return fail(format!("a motion is given for grain {grain}, which is not there"));
         }
         let step = match self.step {
             StepRule::Limits { max_step, .. } if self.fluid.is_none() => max_step,

@@ -127,6 +127,10 @@ fn symptom(time: f64, step: u64, what: &str, remedy: &Remedy) -> String {
     format!("{failure} at t = {time:.6e} s (step {step}): {what}")
 }
 
+fn side_name(axis: usize, side: usize) -> String {
+    format!("{} {}", ["lower", "upper"][side], ["x", "y", "z"][axis])
+}
+
 /// CFL number above which a step counts as unstable.
 const MAX_CFL: f64 = 10.0;
 
@@ -143,10 +147,8 @@ impl Simulation {
                 && grain.angular_velocity.is_finite()
                 && grain.pose.orientation.is_finite();
             if !finite {
-                return unstable(
-                    format!("the motion of grain {i} is not finite"),
-                    Remedy::StepOrContact,
-                );
+                let what = format!("the motion of grain {i} is not finite");
+                return unstable(what, Remedy::StepOrContact);
             }
         }
         if let Some((what, remedy)) = self.excessive_overlap() {
@@ -183,9 +185,8 @@ impl Simulation {
         let open = |o: &Outside| present(o) && enclosure.sides[o.axis][o.side] == Side::Open;
         match outside(&self.setup.grains, &enclosure).into_iter().find(open) {
             Some(Outside { grain, axis, side, .. }) => {
-                let (side, axis) = (["lower", "upper"][side], ["x", "y", "z"][axis]);
-                let what =
-                    format!("{symptom} while grain {grain} crosses the open {side} {axis} side");
+                let side = side_name(axis, side);
+                let what = format!("{symptom} while grain {grain} crosses the open {side} side");
                 (what, Remedy::FartherFace)
             }
             None => (symptom, otherwise),
@@ -199,21 +200,15 @@ impl Simulation {
         let overlap = self.largest_overlap().filter(|it| it.relative > params.overlap_limit)?;
         let RelativeOverlap { grain, partner, depth, relative } = overlap;
         let free = |index: usize| grains[index].translation == MotionConstraint::Free;
-        let other = match partner {
-            Partner::Grain(other) => Some(other),
-            Partner::Wall { .. } => None,
+        let (other, with) = match partner {
+            Partner::Grain(other) => (Some(other), format!("grain {other}")),
+            Partner::Wall { axis, side } => {
+                (None, format!("the {} wall", side_name(axis as usize, side as usize)))
+            }
         };
         if !free(grain) && !other.is_some_and(free) {
             return None;
         }
-        let with = match partner {
-            Partner::Grain(other) => format!("grain {other}"),
-            Partner::Wall { axis, side } => {
-                let (side, axis) =
-                    (["lower", "upper"][side as usize], ["x", "y", "z"][axis as usize]);
-                format!("the {side} {axis} wall")
-            }
-        };
         let what = format!(
             "grain {grain} overlaps {with} by {:.4} mm, {:.1} % of the equivalent diameter; the \
              limit is {:.0} %",

@@ -42,7 +42,8 @@ impl Pair {
         &mut self,
         params: &EventParams,
         time: f64,
-        (line, gap): (DVec3, f64),
+        line: DVec3,
+        gap: f64,
         touching: bool,
         landed: bool,
     ) -> Vec<Event> {

@@ -62,7 +62,7 @@ impl Tracker {
             let line = self.params.line_of_centres(a, b);
             let touching = contacts.iter().any(of_pair) || gap <= 0.0;
             let landed = self.state.landed.iter().any(Option::is_some);
-            let events = pair.update(&self.params, time, (line, gap), touching, landed);
+            let events = pair.update(&self.params, time, line, gap, touching, landed);
             self.state.events.extend(events);
         }
         self.update_landing(time, contacts);
