@@ -26,10 +26,8 @@ const SUBDIVISIONS: usize = 32;
 /// Sub-volumes of a grain, in its own frame.
 #[derive(Debug)]
 pub struct Subvolumes {
-    /// Centres [m].
-    centres: Vec<DVec3>,
-    /// Volumes [m^3]; their sum is the volume of the grain.
-    volumes: Vec<f64>,
+    /// Centres [m] and volumes [m^3]; the sum of the volumes is the volume of the grain.
+    parts: Vec<(DVec3, f64)>,
     /// Edge lengths of a whole sub-volume [m].
     edges: DVec3,
 }
@@ -39,7 +37,7 @@ impl Subvolumes {
     pub fn of(shape: &Shape) -> Subvolumes {
         let edges = (shape.upper() - shape.lower()) / SUBDIVISIONS as f64;
         let width = edges.max_element();
-        let (mut centres, mut volumes) = (Vec::new(), Vec::new());
+        let mut parts = Vec::new();
         let range = || 0..SUBDIVISIONS;
         for [i, j, k] in
             range().flat_map(|k| range().flat_map(move |j| range().map(move |i| [i, j, k])))
@@ -47,20 +45,18 @@ impl Subvolumes {
             let centre = shape.lower() + edges * (DVec3::new(i as f64, j as f64, k as f64) + 0.5);
             let fraction = (0.5 - shape.distance(centre) / width).clamp(0.0, 1.0);
             if fraction > 0.0 {
-                centres.push(centre);
-                volumes.push(fraction);
+                parts.push((centre, fraction));
             }
         }
-        let total: f64 = volumes.iter().sum();
-        let scale = shape.volume() / total;
-        volumes.iter_mut().for_each(|volume| *volume *= scale);
-        // The origin of the frame is the centroid, exactly.
+        let scale = shape.volume() / parts.iter().map(|(_, volume)| volume).sum::<f64>();
         let mut mean = DVec3::ZERO;
-        for (centre, volume) in centres.iter().zip(&volumes) {
+        for (centre, volume) in &mut parts {
+            *volume *= scale;
             mean += *centre * (*volume / shape.volume());
         }
-        centres.iter_mut().for_each(|centre| *centre -= mean);
-        Subvolumes { centres, volumes, edges }
+        // The origin of the frame is the centroid, exactly.
+        parts.iter_mut().for_each(|(centre, _)| *centre -= mean);
+        Subvolumes { parts, edges }
     }
 
     /// Sub-volumes of each of `grains`; equal shapes share theirs.
@@ -101,7 +97,7 @@ impl EmergedPart {
         let extent = normal.abs().dot(subvolumes.edges);
         let height = outward * (pose.position[axis] - coordinate);
         let mut part = EmergedPart::default();
-        for (centre, volume) in subvolumes.centres.iter().zip(&subvolumes.volumes) {
+        for (centre, volume) in &subvolumes.parts {
             let beyond = height + normal.dot(*centre);
             let emerged = |limit: f64| volume * (0.5 + (beyond - limit) / extent).clamp(0.0, 1.0);
             let (whole, normal_part) = (emerged(0.0), emerged(-0.5 * spacing));

@@ -93,10 +93,7 @@ impl OpenSides {
 
     /// First grain with a part beyond a free surface.
     pub fn emerged(&self) -> Option<usize> {
-        let emerged = |crossing: &Crossing| {
-            matches!(crossing, Crossing::Emerged(_) | Crossing::Departing(Some(_)))
-        };
-        self.crossings.iter().position(emerged)
+        self.crossings.iter().position(|crossing| crossing.emerged_part().is_some())
     }
 
     /// Impulse on the fluid in the last step [N s] of a grain that crosses a side; none of another.
@@ -134,13 +131,10 @@ impl OpenSides {
     /// Momentum [kg m/s] that fluid of `density` [kg/m^3] in the part of a grain beyond a free
     /// surface would have.
     pub fn emerged_momentum(&self, index: usize, grain: &Grain, density: f64) -> DVec3 {
-        match self.crossing(index, grain, 0.0) {
-            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => {
-                let momentum = multiply6(&part.inertia, &grain.rigid_velocity().to_vector());
-                density * DVec3::from_slice(&momentum[..3])
-            }
-            _ => DVec3::ZERO,
-        }
+        self.crossing(index, grain, 0.0).emerged_part().map_or(DVec3::ZERO, |part| {
+            let momentum = multiply6(&part.inertia, &grain.rigid_velocity().to_vector());
+            density * DVec3::from_slice(&momentum[..3])
+        })
     }
 
     fn crossing(&self, index: usize, grain: &Grain, dt: f64) -> Crossing {
@@ -149,7 +143,8 @@ impl OpenSides {
         }
         let (mut departing, mut emerged) = (false, None);
         for &(side, boundary) in &self.sides {
-            let margin = MARGIN * self.mesh.spacing[side.axis];
+            let spacing = self.mesh.spacing[side.axis];
+            let margin = MARGIN * spacing;
             let coordinate = side.coordinate(&self.mesh);
             let beyond = |x: DVec3| side.outward() * (x[side.axis] - coordinate);
             if beyond(grain.pose.position) + grain.shape.bounding_radius() < -margin {
@@ -162,9 +157,8 @@ impl OpenSides {
             });
             if boundary == Boundary::FreeSurface {
                 if highest > 0.0 {
-                    let direction = (side.axis, side.outward());
-                    let spacing = self.mesh.spacing[side.axis];
-                    let subvolumes = &self.subvolumes[index];
+                    let (subvolumes, direction) =
+                        (&self.subvolumes[index], (side.axis, side.outward()));
                     // Buoyancy at the start of the step would add energy to the heave.
                     let middle = grain.rigid_velocity().advance(grain.pose, 0.5 * dt);
                     let part = EmergedPart::new(subvolumes, middle, direction, coordinate, spacing);
@@ -292,19 +286,25 @@ impl OpenSides {
 }
 
 impl Crossing {
+    /// Part of the grain beyond a free surface.
+    fn emerged_part(&self) -> Option<&EmergedPart> {
+        match self {
+            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => Some(part),
+            _ => None,
+        }
+    }
+
     /// Weight less buoyancy of a grain in a fluid of `fluid_density` [kg/m^3].
     pub fn weight_less_buoyancy(&self, grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
+        if let Crossing::Left = self {
+            return Load::default();
+        }
         let force = gravity * (grain.density - fluid_density) * grain.shape.volume();
         let submerged = Load { force, torque: DVec3::ZERO };
-        match self {
-            Crossing::Inside | Crossing::Departing(None) => submerged,
-            Crossing::Left => Load::default(),
-            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => {
-                let weight = fluid_density * gravity;
-                let lost = Load { force: part.volume * weight, torque: part.moment.cross(weight) };
-                submerged + lost
-            }
-        }
+        self.emerged_part().map_or(submerged, |part| {
+            let weight = fluid_density * gravity;
+            submerged + Load { force: part.volume * weight, torque: part.moment.cross(weight) }
+        })
     }
 }
 

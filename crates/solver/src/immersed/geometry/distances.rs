@@ -210,10 +210,11 @@ impl Locator {
         band: &mut BandFaces,
     ) {
         let first_forced = band.count() - forced.len();
+        let neighbours = self.neighbours(index);
         for (i, distance) in range.zip(distances) {
             let x = start + f64::from(i) * step;
             let d = f64::from(*distance);
-            let nearest = nearest_distance(self.neighbours(index), &self.shapes, x, self.reach);
+            let nearest = nearest_distance(neighbours, &self.shapes, x, self.reach);
             if forced.contains(&i) {
                 let entry = first_forced + (i - forced.start) as usize;
                 if nearest <= -self.eps && nearest < d {

@@ -26,19 +26,15 @@ impl NarrowBandShapes {
     pub fn new(grains: &[Grain], [eps, reach]: [f64; 2], dimensions: usize) -> NarrowBandShapes {
         // A sphere in two dimensions is a disc, which has half the curvature.
         let variance = band_variance(eps) * 0.5 * (dimensions as f64 - 1.0).max(0.0);
-        let mut indices: HashMap<*const Shape, usize> = HashMap::new();
-        let mut distinct = Vec::new();
-        for grain in grains {
-            indices.entry(Arc::as_ptr(&grain.shape)).or_insert_with(|| {
-                distinct.push(&grain.shape);
-                distinct.len() - 1
-            });
-        }
-        let sampled: Vec<NarrowBandShape> = (distinct.into_par_iter())
-            .map(|shape| NarrowBandShape::new(shape, eps, reach, variance))
+        let key = |grain: &Grain| Arc::as_ptr(&grain.shape).addr();
+        let distinct: HashMap<usize, &Arc<Shape>> =
+            grains.iter().map(|grain| (key(grain), &grain.shape)).collect();
+        let sampled: HashMap<usize, NarrowBandShape> = (distinct.into_par_iter())
+            .map(|(key, shape)| (key, NarrowBandShape::new(shape, eps, reach, variance)))
             .collect();
-        let of = |grain: &Grain| sampled[indices[&Arc::as_ptr(&grain.shape)]].clone();
-        NarrowBandShapes { shapes: grains.iter().map(of).collect() }
+        NarrowBandShapes {
+            shapes: grains.iter().map(|grain| sampled[&key(grain)].clone()).collect(),
+        }
     }
 
     /// Memory held in addition to the shapes [bytes].
