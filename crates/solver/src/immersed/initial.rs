@@ -15,8 +15,7 @@
 //! Irrotational flow exerts no torque on a sphere, so a sphere keeps its angular velocity; the
 //! faces inside it, which are not quite symmetric, would change it.
 
-use super::forcing::ForcedFaces;
-use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, nearest_distance};
+use super::geometry::nearest_distance;
 use super::rigidity::{Impulse, sum_impulse};
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
@@ -75,7 +74,8 @@ impl<R: Real> ImmersedGrains<R> {
         flow.make_solenoidal()
     }
 
-    /// Lists the faces inside the grains as forced faces.
+    /// Lists the faces inside the grains as forced faces, with full weight: those at a negative
+    /// distance, nearer to their grain than to its neighbours.
     fn force_inside(&mut self, grains: &[Grain]) {
         self.locator.find_neighbours(grains, |_| 0.0);
         let params = self.forcing_params(1.0);
@@ -84,7 +84,19 @@ impl<R: Real> ImmersedGrains<R> {
         each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
             locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
-            force_inside(forced, &scratch.band, locator.neighbours(index), locator.shapes());
+            let (band, neighbours) = (&scratch.band, locator.neighbours(index));
+            for (weight, distance) in forced.weight[..band.count()].iter_mut().zip(&band.distance) {
+                *weight = if *distance < 0.0 { 1.0 } else { 0.0 };
+            }
+            for &(entry, x) in &band.shared {
+                let nearest = nearest_distance(neighbours, locator.shapes(), x, 0.0);
+                if nearest < f64::from(band.distance[entry]) {
+                    forced.weight[entry] = 0.0;
+                }
+            }
+            forced.closed_fraction.fill(0.0);
+            forced.total_closed_fraction.fill(0.0);
+            forced.solid_fraction.fill(0.0);
         });
     }
 
@@ -182,26 +194,4 @@ fn free_change(grain: &Grain, impulse: &Vector6) -> RigidVelocity {
         change.angular = grain.inertia().inverse() * DVec3::from_slice(&impulse[3..]);
     }
     change
-}
-
-/// Forces the faces inside the grain alone, with full weight: those nearer to this grain than to
-/// its `neighbours`, at a negative distance in `band`.
-fn force_inside(
-    forced: &mut ForcedFaces,
-    band: &BandFaces,
-    neighbours: &[NeighbourGrain],
-    shapes: &NarrowBandShapes,
-) {
-    let inside = |distance: &f32| if *distance < 0.0 { 1.0 } else { 0.0 };
-    let ForcedFaces { weight, closed_fraction, total_closed_fraction, solid_fraction, .. } = forced;
-    for (weight, distance) in weight[..band.count()].iter_mut().zip(&band.distance) {
-        *weight = inside(distance);
-    }
-    for &(entry, x) in &band.shared {
-        if nearest_distance(neighbours, shapes, x, 0.0) < f64::from(band.distance[entry]) {
-            weight[entry] = 0.0;
-        }
-    }
-    let unused = [closed_fraction, total_closed_fraction, solid_fraction];
-    unused.into_iter().for_each(|list| list.fill(0.0));
 }
