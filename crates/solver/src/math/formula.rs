@@ -42,18 +42,12 @@ impl Formula {
                 with_brackets(formula).ok_or_else(|| wrong("it cannot be read".into()))?;
             let expression =
                 exmex::parse::<f64>(&bracketed).map_err(|error| wrong(error.msg().to_string()))?;
-            let takes = expression
-                .var_names()
-                .iter()
-                .map(|name| {
-                    variables
-                        .iter()
-                        .position(|known| known == name)
-                        .ok_or_else(|| wrong(format!("unknown name \"{name}\"")))
-                })
-                .collect::<Result<Vec<usize>, String>>()?;
-            let expression = Box::new(expression);
-            Ok(Component { expression, takes })
+            let index = |name: &String| {
+                let found = variables.iter().position(|known| known == name);
+                found.ok_or_else(|| wrong(format!("unknown name \"{name}\"")))
+            };
+            let takes = expression.var_names().iter().map(index).collect::<Result<_, String>>()?;
+            Ok(Component { expression: Box::new(expression), takes })
         };
         let components = (0..3).map(component).collect::<Result<_, String>>()?;
         Ok(Formula { text, components })

@@ -2,6 +2,7 @@
 //! simulations, such as the runs of a study that are computed at the same time. Miri has no such
 //! clocks.
 
+#[cfg(all(target_os = "linux", not(miri)))]
 pub(super) use clocks::pool_cpu_time;
 
 #[cfg(all(target_os = "linux", not(miri)))]
@@ -47,10 +48,6 @@ mod clocks {
 }
 
 #[cfg(any(miri, not(target_os = "linux")))]
-mod clocks {
-    use std::time::Duration;
-
-    pub fn pool_cpu_time() -> Option<Duration> {
-        None
-    }
+pub(super) fn pool_cpu_time() -> Option<std::time::Duration> {
+    None
 }
