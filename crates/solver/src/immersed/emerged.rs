@@ -38,11 +38,10 @@ impl Subvolumes {
         let edges = (shape.upper() - shape.lower()) / SUBDIVISIONS as f64;
         let width = edges.max_element();
         let mut parts = Vec::new();
-        let range = || 0..SUBDIVISIONS;
-        for [i, j, k] in
-            range().flat_map(|k| range().flat_map(move |j| range().map(move |i| [i, j, k])))
-        {
-            let centre = shape.lower() + edges * (DVec3::new(i as f64, j as f64, k as f64) + 0.5);
+        for n in 0..SUBDIVISIONS.pow(3) {
+            let index = [1, SUBDIVISIONS, SUBDIVISIONS.pow(2)].map(|step| n / step % SUBDIVISIONS);
+            let index = DVec3::from_array(index.map(|i| i as f64));
+            let centre = shape.lower() + edges * (index + 0.5);
             let fraction = (0.5 - shape.distance(centre) / width).clamp(0.0, 1.0);
             if fraction > 0.0 {
                 parts.push((centre, fraction));

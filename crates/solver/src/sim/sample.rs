@@ -4,11 +4,10 @@ use glam::DVec3;
 
 use super::Simulation;
 use super::probe::SampledGrid;
+use super::solid_fraction::{SUBCELLS, fraction_within};
 use crate::dem::Grain;
 use crate::grid::Axis;
 
-/// Sub-cells along each edge of a cell face, for the grains on a plane.
-const SUBCELLS: usize = 4;
 /// Distance of a plane from a layer of faces below which it counts as that layer [cells].
 const ON_FACES: f64 = 1e-9;
 
@@ -152,13 +151,7 @@ impl Simulation {
                     lever_arm[normal] = height;
                     lever_arm[a] = centre_a + offset(0, part % parts[0]);
                     lever_arm[b] = centre_b + offset(1, part / parts[0]);
-                    let orientation = grain.pose.orientation;
-                    let (distance, gradient) =
-                        (grain.shape).distance_and_gradient(orientation.conjugate() * lever_arm);
-                    let outward = orientation * gradient.normalize_or_zero();
-                    // Each sub-cell is cut by the line in which the nearest surface meets it.
-                    let across = outward.abs().dot(width).max(f64::MIN_POSITIVE);
-                    let fraction = (0.5 - distance / across).clamp(0.0, 1.0);
+                    let fraction = fraction_within(grain, lever_arm, width, f64::MIN_POSITIVE);
                     if fraction > 0.0 {
                         let share = fraction / (parts[0] * parts[1]) as f64;
                         faces.fraction[cell] = (faces.fraction[cell] + share).min(1.0);

@@ -5,8 +5,20 @@ use glam::DVec3;
 use super::Simulation;
 use crate::dem::Grain;
 
-/// Sub-cells along each axis of a cell cut by a surface.
-const SUBCELLS: usize = 4;
+/// Sub-cells along each axis of a cell, or of its face, cut by a surface.
+pub(super) const SUBCELLS: usize = 4;
+
+/// Part inside a grain of a sub-cell, which the tangent plane of the nearest surface cuts; for a
+/// sub-cell of a face, the line in which the two meet. `lever_arm` leads from the centroid to its
+/// centre. Along the normal, the extent given by its `edges` counts as `thinnest` at least [m].
+pub(super) fn fraction_within(grain: &Grain, lever_arm: DVec3, edges: DVec3, thinnest: f64) -> f64 {
+    let orientation = grain.pose.orientation;
+    let point = orientation.conjugate() * lever_arm;
+    let (distance, gradient) = grain.shape.distance_and_gradient(point);
+    let normal = orientation * gradient.normalize_or_zero();
+    let width = normal.abs().dot(edges).max(thinnest);
+    (0.5 - distance / width).clamp(0.0, 1.0)
+}
 
 impl Simulation {
     /// Solid fraction of cell (i, j, k), counted from 0. A cell near a surface is divided into
@@ -22,29 +34,20 @@ impl Simulation {
         if near.is_empty() {
             return 0.0;
         }
-        let subcell = edge / DVec3::from_array(counts.map(|n| n as f64));
-        let thinnest = (0..3)
-            .filter(|axis| subcell[*axis] > 0.0)
-            .map(|axis| subcell[axis])
-            .fold(f64::INFINITY, f64::min);
-        let offset =
-            |i: usize, axis: usize| (i as f64 + 0.5 - 0.5 * counts[axis] as f64) * subcell[axis];
+        let along = DVec3::from_array(counts.map(|n| n as f64));
+        let subcell = edge / along;
+        let thinnest = mesh.resolved_axes().map(|axis| subcell[axis]).fold(f64::INFINITY, f64::min);
+        let (count, [_, ny, nz]) = (counts.iter().product::<usize>(), counts);
         let mut sum = 0.0;
-        for (i, j, k) in (0..counts[0])
-            .flat_map(|i| (0..counts[1]).flat_map(move |j| (0..counts[2]).map(move |k| (i, j, k))))
-        {
-            let offset = DVec3::new(offset(i, 0), offset(j, 1), offset(k, 2));
+        for n in 0..count {
+            let index = [n / (ny * nz), n / nz % ny, n % nz].map(|i| i as f64);
+            let offset = (DVec3::from_array(index) + 0.5 - 0.5 * along) * subcell;
             let fractions = near.iter().map(|(grain, lever_arm)| {
-                let orientation = grain.pose.orientation;
-                let point = orientation.conjugate() * (*lever_arm + offset);
-                let (distance, gradient) = grain.shape.distance_and_gradient(point);
-                let normal = orientation * gradient.normalize_or_zero();
-                let width = normal.abs().dot(subcell).max(thinnest);
-                (0.5 - distance / width).clamp(0.0, 1.0)
+                fraction_within(grain, *lever_arm + offset, subcell, thinnest)
             });
             sum += fractions.fold(0.0, f64::max);
         }
-        sum / counts.iter().product::<usize>() as f64
+        sum / count as f64
     }
 
     /// Grains whose surface may cut a cell with these edges [m], with the vector from centroid to
