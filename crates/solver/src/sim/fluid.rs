@@ -130,9 +130,7 @@ where
         self.flow.whole.project_prediction(dt);
     }
     fn couple(&mut self, input: CouplingInput) -> CoupledGrains {
-        if !self.followed.is_empty() {
-            self.followed.clone_from_slice(input.grains);
-        }
+        self.followed.iter_mut().zip(input.grains).for_each(|(kept, grain)| kept.clone_from(grain));
         self.grains.couple(self.flow.finest_mut(), input)
     }
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidityInput) {
@@ -148,9 +146,7 @@ where
         self.flow.whole.cover_boundary(covered);
     }
     fn locate(&mut self, grains: &[Grain]) {
-        if !self.followed.is_empty() {
-            self.followed.clone_from_slice(grains);
-        }
+        self.followed.iter_mut().zip(grains).for_each(|(kept, grain)| kept.clone_from(grain));
         self.grains.move_to_grid(self.flow.finest(), grains);
     }
     fn project(&mut self, dt: f64) {

@@ -29,7 +29,6 @@ use crate::dem::{
 use crate::grid::Mesh;
 use crate::immersed::{OpenSides, PreviousStep};
 use crate::math::{Load, Pose};
-use crate::poisson::PoissonTimes;
 
 use clock::Clock;
 use fluid::Fluid;
@@ -86,7 +85,7 @@ struct StepData {
 }
 
 impl StepData {
-    fn new(setup: &Setup, times: PassTimes) -> StepData {
+    fn new(setup: &Setup) -> StepData {
         let (grains, count) = (&setup.grains, setup.grains.len());
         // With fluid the equations of the grains contain the damping (`Start::prepare`).
         let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
@@ -94,7 +93,7 @@ impl StepData {
         StepData {
             dynamics: ContactDynamics::new(contact, setup.enclosure()),
             open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, grains),
-            times,
+            times: PassTimes::default(),
             momentum_residual: DVec3::ZERO,
             loads: vec![Load::default(); count],
             previous: vec![PreviousStep::default(); count],
@@ -122,9 +121,10 @@ impl Simulation {
         setup.validate()?;
         (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
         let fluid = setup.fluid.map(|params| fluid::start(&mut setup, &params));
-        let initial = fluid.as_ref().map_or(PoissonTimes::default(), |fluid| fluid.poisson_times());
-        let times = PassTimes { initial, ..PassTimes::default() };
-        let (clock, data) = (Clock::new(&setup), StepData::new(&setup, times));
+        let (clock, mut data) = (Clock::new(&setup), StepData::new(&setup));
+        if let Some(fluid) = &fluid {
+            data.times.initial = fluid.poisson_times();
+        }
         Ok(Simulation { setup, clock, fluid, data })
     }
     /// Simulated time [s].

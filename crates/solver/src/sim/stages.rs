@@ -47,12 +47,9 @@ pub(super) struct Coupled<'a>(Context<'a>, CoupledGrains, TrialStep);
 pub(super) struct Resolved<'a>(Context<'a>, CoupledGrains);
 /// Rigid velocities imposed on the prediction.
 pub(super) struct Rigid<'a>(Context<'a>);
-/// Flow with a divergence-free velocity.
-pub(super) struct Projected<'a> {
-    context: Context<'a>,
-    /// Momentum of the fluid over its density before the projection [m^4/s].
-    momentum_before: DVec3,
-}
+/// Flow with a divergence-free velocity; momentum of the fluid over its density before the
+/// projection [m^4/s].
+pub(super) struct Projected<'a>(Context<'a>, DVec3);
 
 impl<'a> Start<'a> {
     /// Records the state before the step of `dt` [s] and sets weight, buoyancy, external
@@ -103,8 +100,8 @@ impl<'a> Start<'a> {
 }
 
 impl GrainContext<'_> {
-    /// Moves the grains by the sub-steps `take` under weight, buoyancy and the hydrodynamic load of the
-    /// last step (Eqs 6 to 36).
+    /// Moves the grains by the sub-steps `take` under weight, buoyancy and the hydrodynamic load of
+    /// the last step (Eqs 6 to 36).
     fn take_substeps<T>(
         &mut self,
         take: impl FnOnce(&mut ContactDynamics, &mut [Grain], &[Load], f64, &mut [Load]) -> T,
@@ -233,16 +230,17 @@ impl<'a> Rigid<'a> {
         let Rigid(Context { solid, fluid }) = self;
         let momentum_before = fluid.measures().momentum;
         timed(&mut solid.data.times.project, || fluid.project(solid.dt));
-        Projected { context: Context { solid, fluid }, momentum_before }
+        Projected(Context { solid, fluid }, momentum_before)
     }
 }
 
 impl Projected<'_> {
     /// Balances the momentum and records what the next step needs.
     pub fn finish(self) {
-        let Context { solid: GrainContext { setup, data, dt, .. }, fluid } = self.context;
+        let Projected(Context { solid, fluid }, momentum_before) = self;
+        let GrainContext { setup, data, dt, .. } = solid;
         let density = setup.fluid.map_or(0.0, |params| params.density);
-        let gain = fluid.measures().momentum - self.momentum_before;
+        let gain = fluid.measures().momentum - momentum_before;
         let mut residual = density * (gain - fluid.boundary_impulse(dt));
         for (i, (grain, load)) in setup.grains.iter_mut().zip(&data.loads).enumerate() {
             data.located[i] = grain.pose;
