@@ -219,36 +219,23 @@ impl OpenSides {
     }
 
     fn list_faces_of(&mut self, index: usize, grain: &Grain, side: BoxSide) {
-        let (mesh, centre) = (self.mesh, grain.pose.position);
-        let axes = [(side.axis + 1) % 3, (side.axis + 2) % 3];
-        let [a, b] = axes.map(|axis| {
-            if !mesh.is_resolved(axis) {
-                return 0..=0;
-            }
-            let cell = |x: f64| ((x - mesh.origin[axis]) / mesh.spacing[axis]).floor() as i64;
-            let radius = grain.shape.bounding_radius();
-            cell(centre[axis] - radius)..=cell(centre[axis] + radius)
-        });
-        let width = 0.5 * (mesh.spacing[axes[0]] + mesh.spacing[axes[1]]);
-        // Index of a face inside the box, counted from 1.
-        let inside = |n: i64, axis: usize| {
-            let count = mesh.cells[axis] as i64;
-            let n = if self.periodic[axis] { n.rem_euclid(count) } else { n };
-            (0..count).contains(&n).then_some(n as usize + 1)
-        };
-        for (n, m) in b.flat_map(|m| a.clone().map(move |n| (n, m))) {
-            let (Some(i), Some(j)) = (inside(n, axes[0]), inside(m, axes[1])) else { continue };
-            let mut x = DVec3::ZERO;
-            x[side.axis] = side.coordinate(&mesh);
-            for (axis, n) in axes.into_iter().zip([n, m]) {
-                x[axis] = mesh.origin[axis] + mesh.spacing[axis] * (n as f64 + 0.5);
-            }
-            let distance = grain.shape.distance(grain.pose.to_body(x));
-            let fraction = (0.5 - distance / width).clamp(0.0, 1.0);
-            if fraction > 0.0 {
-                let lever_arm = x - centre;
-                let face = CoveredFace { side, indices: [i, j], fraction, velocity: 0.0 };
-                self.faces.push(GrainFace { grain: index, lever_arm, face });
+        let (mesh, pose, radius) = (self.mesh, grain.pose, grain.shape.bounding_radius());
+        let [a, b] = [(side.axis + 1) % 3, (side.axis + 2) % 3];
+        let [columns, rows] = [a, b]
+            .map(|axis| mesh.cells_near(axis, self.periodic[axis], pose.position[axis], radius));
+        let width = 0.5 * (mesh.spacing[a] + mesh.spacing[b]);
+        let mut lever_arm = DVec3::ZERO;
+        lever_arm[side.axis] = side.coordinate(&mesh) - pose.position[side.axis];
+        for (j, along_b) in rows {
+            for (i, along_a) in columns.clone() {
+                (lever_arm[a], lever_arm[b]) = (along_a, along_b);
+                let distance = grain.shape.distance(pose.orientation.conjugate() * lever_arm);
+                let fraction = (0.5 - distance / width).clamp(0.0, 1.0);
+                if fraction > 0.0 {
+                    let indices = [i + 1, j + 1];
+                    let face = CoveredFace { side, indices, fraction, velocity: 0.0 };
+                    self.faces.push(GrainFace { grain: index, lever_arm, face });
+                }
             }
         }
     }

@@ -140,9 +140,13 @@ impl Simulation {
         for (n, axis) in [a, b].into_iter().enumerate().filter(|(n, _)| resolved[*n]) {
             width[axis] = edges[n] / parts[n] as f64;
         }
-        let columns = [a, b].map(|axis| self.cells_near(axis, grain.pose.position[axis], reach));
-        for (cell_b, centre_b) in &columns[1] {
-            for (cell_a, centre_a) in &columns[0] {
+        let [columns, rows] = [a, b].map(|axis| {
+            let periodic = self.setup.boundaries.is_periodic(axis);
+            let cells = mesh.cells_near(axis, periodic, grain.pose.position[axis], reach);
+            cells.map(move |(cell, along)| (cell, if mesh.is_resolved(axis) { along } else { 0.0 }))
+        });
+        for (cell_b, centre_b) in rows {
+            for (cell_a, centre_a) in columns.clone() {
                 let cell = cell_a + mesh.cells[a] * cell_b;
                 for part in 0..parts[0] * parts[1] {
                     let offset =
@@ -161,28 +165,6 @@ impl Simulation {
                 }
             }
         }
-    }
-
-    /// Cells along `axis` within `reach` [m] of a coordinate, each with the distance of its centre
-    /// from it [m]; across periodic sides too.
-    fn cells_near(&self, axis: usize, centre: f64, reach: f64) -> Vec<(usize, f64)> {
-        let mesh = &self.setup.mesh;
-        let n = mesh.cells[axis] as i64;
-        if n == 1 {
-            return vec![(0, 0.0)];
-        }
-        let (h, periodic) = (mesh.spacing[axis], self.setup.boundaries.is_periodic(axis));
-        let index = |x: f64| ((x - mesh.origin[axis]) / h).floor() as i64;
-        let (mut from, mut to) = (index(centre - reach), index(centre + reach));
-        if !periodic {
-            (from, to) = (from.max(0), to.min(n - 1));
-        }
-        (from..=to)
-            .map(|i| {
-                let at = mesh.origin[axis] + (i as f64 + 0.5) * h;
-                (i.rem_euclid(n) as usize, at - centre)
-            })
-            .collect()
     }
 }
 
