@@ -36,8 +36,6 @@ pub(super) trait Fluid: Send + Sync {
     fn cover_boundary(&mut self, covered: &[CoveredFace]);
     /// Makes the velocity divergence-free.
     fn project(&mut self, dt: f64);
-    /// Finds the faces near restored grains.
-    fn locate(&mut self, grains: &[Grain]);
     /// Measures of the last projection.
     fn measures(&self) -> &FlowMeasures;
     /// Momentum per density gained through the boundaries in a step of `dt` [s] [m^4/s].
@@ -58,8 +56,9 @@ pub(super) trait Fluid: Send + Sync {
     fn bytes(&self) -> usize;
     /// Writes measures and fields.
     fn save(&self, out: &mut Encoder) -> io::Result<()>;
-    /// Restores the state written by `save`; `last_step` [s] is the length of the last step.
-    fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()>;
+    /// Restores the state written by `save` and finds the faces near `grains`; `last_step` [s] is
+    /// the length of the last step.
+    fn restore(&mut self, input: &mut Decoder, last_step: f64, grains: &[Grain]) -> io::Result<()>;
 }
 
 /// Builds the fluid of a set-up at t = 0; released grains get their new velocities.
@@ -145,10 +144,6 @@ where
     fn cover_boundary(&mut self, covered: &[CoveredFace]) {
         self.flow.whole.cover_boundary(covered);
     }
-    fn locate(&mut self, grains: &[Grain]) {
-        self.followed.iter_mut().zip(grains).for_each(|(kept, grain)| kept.clone_from(grain));
-        self.grains.move_to_grid(self.flow.finest(), grains);
-    }
     fn project(&mut self, dt: f64) {
         self.measures = self.flow.project(dt);
     }
@@ -194,7 +189,7 @@ where
         }
         Ok(())
     }
-    fn restore(&mut self, input: &mut Decoder, last_step: f64) -> io::Result<()> {
+    fn restore(&mut self, input: &mut Decoder, last_step: f64, grains: &[Grain]) -> io::Result<()> {
         input.expect(R::BYTES, "bytes a number")?;
         let m = &mut self.measures;
         [m.max_divergence, m.max_rate, m.max_velocity, m.kinetic_energy] = input.numbers()?;
@@ -215,6 +210,8 @@ where
         }
         // The saved ghosts belong to the walls of the saved run, whose velocities may differ.
         self.flow.fill_ghosts();
+        self.followed.iter_mut().zip(grains).for_each(|(kept, grain)| kept.clone_from(grain));
+        self.grains.move_to_grid(self.flow.finest(), grains);
         Ok(())
     }
 }

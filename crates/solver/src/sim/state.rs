@@ -78,8 +78,7 @@ impl Simulation {
                 *pose = restore_pose(&mut input, &self.setup.mesh)?;
                 grain.pose = *pose;
             }
-            fluid.restore(&mut input, self.clock.last_step)?;
-            fluid.locate(&grains);
+            fluid.restore(&mut input, self.clock.last_step, &grains)?;
         }
         if let Some(open_sides) = &mut data.open_sides {
             if input.u64()? != OPEN_SIDES {
