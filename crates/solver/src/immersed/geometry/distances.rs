@@ -14,7 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::Locator;
 use super::aperture::forcing_reach;
-use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowSpan};
+use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan};
 use super::narrow_band::{load_all, nearest_distance, store_all};
 use crate::dem::Grain;
 use crate::grid::FACE_OFFSET;
@@ -32,6 +32,7 @@ pub struct LocateScratch {
     points: [Aligned<f32>; 3],
     /// Mean distances of the candidates [m].
     mean_distances: Aligned<f32>,
+    parts: Vec<RowPart>,
 }
 
 /// Kernel that fills the lists of one grain.
@@ -161,23 +162,22 @@ impl FillLists<'_> {
         let limits = [self.locator.reach, forcing_reach(self.locator.eps)];
         let [span, in_band] = shorten::<V>(distances, candidates, limits);
         self.body.spans[component][row] = span;
-        if span.start == span.end {
-            return;
-        }
         let h = self.locator.mesh.spacing;
         let start = corner + h * DVec3::new(0.0, f64::from(j), f64::from(k));
         let step = h.x * DVec3::X;
-        let LocateScratch { band, points, mean_distances } = &mut *self.scratch;
-        let (map, faces) = (&self.body.index_map, span.start..span.end);
-        for (range, [at, below]) in map.contiguous_parts(component, [j, k], faces) {
+        let LocateScratch { band, points, mean_distances, parts } = &mut *self.scratch;
+        parts.clear();
+        (self.body.index_map).contiguous_parts(component, [j, k], span.start..span.end, parts);
+        for part in &*parts {
+            let range = part.range.clone();
             let first = span.entry(range.start);
-            self.body.rows[component].push(FaceRow { at, first, count: range.len() });
+            self.body.rows[component].push(FaceRow { at: part.at, first, count: range.len() });
             let forced = range.start.max(in_band.start)..range.end.min(in_band.end);
             if !forced.is_empty() {
                 let skipped = (forced.start - range.start) as usize;
                 self.runs[component].push(FaceRun {
-                    at: at + skipped,
-                    below: below + skipped,
+                    at: part.at + skipped,
+                    below: part.below + skipped,
                     lever_arm: start - self.grain.pose.position + f64::from(forced.start) * step,
                     first: band.count(),
                     count: forced.len(),

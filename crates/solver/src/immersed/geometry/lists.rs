@@ -195,6 +195,17 @@ pub struct IndexMap {
     offsets: [Vec<usize>; 3],
 }
 
+/// Unknown faces of one row that are adjacent in memory.
+#[derive(Clone, Debug)]
+pub struct RowPart {
+    /// Indices along x, counted from the side of the box.
+    pub range: Range<i32>,
+    /// Position in memory of the first face, and of the cell above it.
+    pub at: usize,
+    /// Position in memory of the cell below the first face.
+    pub below: usize,
+}
+
 impl IndexMap {
     /// Fills the map of the box of `size` cells from cell `first` on (counted from 1).
     pub fn fill(&mut self, mesh: &Mesh, periodic: [bool; 3], first: IVec3, size: IVec3) {
@@ -227,35 +238,44 @@ impl IndexMap {
         first as i32 - PAD..offsets.len() as i32 - last as i32 - PAD
     }
 
-    /// Parts, contiguous in memory, of the faces `range` in row (j, k) of `component`: indices
-    /// along x, and positions in memory of the first face (and of the cell above it) and of the
-    /// cell below it.
+    /// Appends to `parts` the parts, contiguous in memory, of the faces `range` in row (j, k) of
+    /// `component`.
     #[inline]
     pub fn contiguous_parts(
         &self,
         component: usize,
         [j, k]: [i32; 2],
-        mut range: Range<i32>,
-    ) -> impl Iterator<Item = (Range<i32>, [usize; 2])> {
+        range: Range<i32>,
+        parts: &mut Vec<RowPart>,
+    ) {
+        if range.is_empty() {
+            return;
+        }
         let offset = |axis: usize, normal: bool, index: i32| {
             self.unknown_offsets[axis][usize::from(normal)][(index + PAD) as usize]
         };
         let down = IVec3::AXES[component];
         let row = offset(1, component == 1, j) + offset(2, component == 2, k);
         let row_below = offset(1, false, j - down.y) + offset(2, false, k - down.z);
-        let positions = move |i: i32| {
+        let positions = |i: i32| {
             let at = offset(0, component == 0, i) + row;
             let below = offset(0, false, i - down.x) + row_below;
-            (at < NONE && below < NONE).then_some([at, below])
+            (at < NONE && below < NONE).then_some((at, below))
         };
-        std::iter::from_fn(move || {
-            let (start, first) = range.find_map(|i| Some((i, positions(i)?)))?;
-            let next = |i: i32| Some(first.map(|at| at + (i - start) as usize));
-            while !range.is_empty() && positions(range.start) == next(range.start) {
-                range.start += 1;
+        let mut i = range.start;
+        while i < range.end {
+            let Some((at, below)) = positions(i) else {
+                i += 1;
+                continue;
+            };
+            let start = i;
+            let next = |i: i32| Some((at + (i - start) as usize, below + (i - start) as usize));
+            while i < range.end && positions(i) == next(i) {
+                i += 1;
             }
-            Some((start..range.start, first))
-        })
+            let range = start..i;
+            parts.push(RowPart { range, at, below });
+        }
     }
 
     /// Positions in memory from the first plane of the box to the last.

@@ -40,9 +40,11 @@ impl NarrowBandShapes {
     /// Memory held in addition to the shapes [bytes].
     pub fn bytes(&self) -> usize {
         let samples = self.shapes.iter().filter_map(|shape| shape.samples.as_ref());
-        let counts: HashMap<usize, usize> =
-            samples.map(|it| (Arc::as_ptr(it).addr(), it.mean_excess.len())).collect();
-        2 * size_of::<f32>() * counts.values().sum::<usize>()
+        let mut samples: Vec<_> = samples.collect();
+        samples.sort_by_key(|samples| Arc::as_ptr(samples));
+        samples.dedup_by_key(|samples| Arc::as_ptr(samples));
+        let levels = samples.iter().map(|samples| 2 * samples.mean_excess.len());
+        size_of::<f32>() * levels.sum::<usize>()
     }
 }
 
