@@ -206,11 +206,14 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let (at, first) = (self.velocity.row([j, k]), planes.first_entry(j));
         let [a, b, c] = &self.axes;
         let index = [0, j, k];
-        let advected = [0, 1, 2].map(|along| self.advected_faces(along, index));
+        let faces = |along| self.advected_faces(along, index);
+        let advected = [faces(0), faces(1), faces(2)];
         let rigid = self.rigid.first_of_row([j, k]);
         let row_length = planes.row_length;
         let LinkPlanes { weight, flux_y, flux_z, .. } = planes;
-        let [wx, wy, wz] = weight.each_ref().map(|weight| &weight[first..][..row_length]);
+        let [wx, wy, wz] = weight;
+        let (wx, wy, wz) =
+            (&wx[first..][..row_length], &wy[first..][..row_length], &wz[first..][..row_length]);
         let (fy, fz) = (&mut flux_y[..row_length], &mut flux_z[first..][..row_length]);
         let zero = V::constant(0.0);
         let (mut n, mut last_flux, mut index) = (0, zero, V::ramp());
@@ -245,6 +248,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
 
     /// Faces to load for the links along an axis of the row with `index`; first index along x of
     /// the links that have six faces in line, and the index after the last.
+    #[inline(always)]
     fn advected_faces(&self, along: usize, index: [i32; 3]) -> (&Stencil<6>, [f64; 2]) {
         let (axis, range, index) = (&self.axes[along], &self.unknowns[along], index[along]);
         let [start, end] = [range.start + 2 - index, range.end - 3 - index];
