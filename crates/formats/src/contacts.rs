@@ -4,14 +4,13 @@
 //! The second body of a contact has one number: the index of a grain, or a negative number for a
 //! side of the box ([`wall_code`]).
 
-use std::fmt::Write as _;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use glam::DVec3;
 
-use crate::disk::write_atomically;
-use crate::vtk_xml::{ArrayElements, close_appended, open_appended, write_head, write_length};
+use crate::polygonal::{self, Array};
+use crate::table::append_cells;
 
 /// Name of the table in a run folder.
 pub const FILE: &str = "contacts.csv";
@@ -63,11 +62,8 @@ impl ContactRow {
     pub fn append_to(&self, text: &mut String) {
         let (x, n, f) = (self.point, self.normal, self.force);
         let numbers = [x.x, x.y, x.z, n.x, n.y, n.z, self.overlap, f.x, f.y, f.z];
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{:?},{},{}", self.time, self.grain, self.partner);
-        for number in numbers {
-            let _ = write!(text, ",{number:?}");
-        }
+        *text += &format!("{:?},{},{}", self.time, self.grain, self.partner);
+        append_cells(text, numbers);
         text.push('\n');
     }
 }
@@ -78,15 +74,12 @@ impl ContactRow {
 /// Errors of the operating system.
 pub fn write_points(path: &Path, time: f64, contacts: &[ContactRow]) -> io::Result<()> {
     let points: Vec<DVec3> = contacts.iter().map(|c| c.point).collect();
-    let vectors = |of: fn(&ContactRow) -> DVec3| contacts.iter().flat_map(move |c| triple(of(c)));
-    let data = [
-        Array::singles("force", 3, vectors(|c| c.force)),
-        Array::singles("normal", 3, vectors(|c| c.normal)),
-        Array::singles("overlap", 1, contacts.iter().map(|c| c.overlap as f32)),
-        Array::integers("grain", contacts.iter().map(|c| c.grain as i32)),
-        Array::integers("partner", contacts.iter().map(|c| c.partner as i32)),
-    ];
-    write(path, time, &points, &data, &[], ("Verts", 1))
+    let [overlap, grain, partner] = shared_arrays(contacts);
+    let force = Array::vectors("force", contacts.iter().map(|c| c.force));
+    let normal = Array::vectors("normal", contacts.iter().map(|c| c.normal));
+    let of_points = vec![force, normal, overlap, grain, partner];
+    let data = vec![("PointData", of_points), ("CellData", Vec::new())];
+    polygonal::write(path, time, &points, data, ("Verts", 1), 0..points.len())
 }
 
 /// Writes the contact network in single precision: one line per contact between the centroids of
@@ -97,96 +90,24 @@ pub fn write_points(path: &Path, time: f64, contacts: &[ContactRow]) -> io::Resu
 pub fn write_network(path: &Path, time: f64, contacts: &[ContactRow]) -> io::Result<()> {
     let points: Vec<DVec3> = contacts.iter().flat_map(|c| [c.centre, c.partner_centre]).collect();
     let magnitudes = || contacts.iter().map(|c| c.force.length() as f32);
+    let [overlap, grain, partner] = shared_arrays(contacts);
+    let force = Array::vectors("force", contacts.iter().map(|c| c.force));
+    let magnitude = Array::singles("force_magnitude", magnitudes());
+    let of_lines = vec![force, magnitude, overlap, grain, partner];
     // The magnitude is also at the points, where filters for tubes look for it.
     let at_points = magnitudes().flat_map(|force| [force; 2]);
-    let of_lines = [
-        Array::singles("force", 3, contacts.iter().flat_map(|c| triple(c.force))),
-        Array::singles("force_magnitude", 1, magnitudes()),
-        Array::singles("overlap", 1, contacts.iter().map(|c| c.overlap as f32)),
-        Array::integers("grain", contacts.iter().map(|c| c.grain as i32)),
-        Array::integers("partner", contacts.iter().map(|c| c.partner as i32)),
-    ];
-    let of_points = [Array::singles("force_magnitude", 1, at_points)];
-    write(path, time, &points, &of_points, &of_lines, ("Lines", 2))
+    let of_points = vec![Array::singles("force_magnitude", at_points)];
+    let data = vec![("PointData", of_points), ("CellData", of_lines)];
+    polygonal::write(path, time, &points, data, ("Lines", 2), 0..points.len())
 }
 
-fn triple(v: DVec3) -> [f32; 3] {
-    v.as_vec3().to_array()
-}
-
-/// Array of a file, little-endian.
-struct Array {
-    kind: &'static str,
-    name: &'static str,
-    components: usize,
-    bytes: Vec<u8>,
-}
-
-impl Array {
-    fn singles(name: &'static str, components: usize, values: impl Iterator<Item = f32>) -> Array {
-        Array {
-            kind: "Float32",
-            name,
-            components,
-            bytes: values.flat_map(f32::to_le_bytes).collect(),
-        }
-    }
-    fn integers(name: &'static str, values: impl Iterator<Item = i32>) -> Array {
-        Array {
-            kind: "Int32",
-            name,
-            components: 1,
-            bytes: values.flat_map(i32::to_le_bytes).collect(),
-        }
-    }
-}
-
-/// Writes points with the cells `(kind, points of each)`, which take the points in turn.
-fn write(
-    path: &Path,
-    time: f64,
-    points: &[DVec3],
-    of_points: &[Array],
-    of_cells: &[Array],
-    (kind, each): (&str, usize),
-) -> io::Result<()> {
-    let (points_count, cells) = (points.len(), points.len() / each);
-    let [verts, lines] = ["Verts", "Lines"].map(|other| if kind == other { cells } else { 0 });
-    let coordinates = Array::singles("Points", 3, points.iter().flat_map(|x| triple(*x)));
-    let corners = Array::integers("connectivity", (0..points_count).map(|n| n as i32));
-    let ends = Array::integers("offsets", (1..=cells).map(|n| (each * n) as i32));
-    write_atomically(path, false, |out| {
-        write_head(out, "PolyData", "", time)?;
-        writeln!(
-            out,
-            "<Piece NumberOfPoints=\"{points_count}\" NumberOfVerts=\"{verts}\" \
-             NumberOfLines=\"{lines}\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">"
-        )?;
-        let mut elements = ArrayElements::default();
-        let mut section = |out: &mut dyn Write, name: &str, arrays: &[&Array]| {
-            write!(out, "<{name}>")?;
-            for array in arrays {
-                let bytes = array.bytes.len() as u64;
-                let element = elements.next(array.kind, array.name, array.components, bytes);
-                write!(out, "{element}")?;
-            }
-            writeln!(out, "</{name}>")
-        };
-        let of_points: Vec<&Array> = of_points.iter().collect();
-        let of_cells: Vec<&Array> = of_cells.iter().collect();
-        section(out, "Points", &[&coordinates])?;
-        section(out, "PointData", &of_points)?;
-        section(out, "CellData", &of_cells)?;
-        section(out, kind, &[&corners, &ends])?;
-        writeln!(out, "</Piece>\n</PolyData>")?;
-        open_appended(out)?;
-        let arrays = [&coordinates].into_iter().chain(of_points).chain(of_cells);
-        for array in arrays.chain([&corners, &ends]) {
-            write_length(out, array.bytes.len() as u64)?;
-            out.write_all(&array.bytes)?;
-        }
-        close_appended(out)
-    })
+/// Returns overlaps, grains and partners.
+fn shared_arrays(contacts: &[ContactRow]) -> [Array; 3] {
+    [
+        Array::singles("overlap", contacts.iter().map(|c| c.overlap as f32)),
+        Array::integers("grain", contacts.iter().map(|c| c.grain as i64)),
+        Array::integers("partner", contacts.iter().map(|c| c.partner)),
+    ]
 }
 
 #[cfg(test)]

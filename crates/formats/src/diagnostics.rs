@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::table::append_cells;
+
 /// Name of the file in a run folder.
 pub const FILE: &str = "diagnostics.csv";
 /// Header of the table.
@@ -47,26 +49,18 @@ pub struct DiagnosticsRow {
 impl DiagnosticsRow {
     /// Returns the line of the table, with its line break; numbers are read back exactly.
     pub fn to_line(&self) -> String {
+        let mut line = format!("{:?},{}", self.time, self.step);
+        let speeds = [self.max_divergence, self.max_velocity, self.slip];
+        let energies = [self.fluid_kinetic_energy, self.grain_kinetic_energy];
+        append_cells(&mut line, [self.dt, self.cfl].into_iter().chain(speeds).chain(energies));
+        append_cells(
+            &mut line,
+            self.momentum.to_array().into_iter().chain([self.momentum_residual]),
+        );
         let gap = self.gap.map_or(String::new(), |gap| format!("{gap:?}"));
-        format!(
-            "{:?},{},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?},{},{gap},{:?},{:?}\n",
-            self.time,
-            self.step,
-            self.dt,
-            self.cfl,
-            self.max_divergence,
-            self.max_velocity,
-            self.slip,
-            self.fluid_kinetic_energy,
-            self.grain_kinetic_energy,
-            self.momentum.x,
-            self.momentum.y,
-            self.momentum.z,
-            self.momentum_residual,
-            self.contacts,
-            self.max_overlap,
-            self.mean_overlap
-        )
+        line += &format!(",{},{gap}", self.contacts);
+        append_cells(&mut line, [self.max_overlap, self.mean_overlap]);
+        line + "\n"
     }
 }
 

@@ -1,12 +1,11 @@
 //! Motion of the grains (`grains.csv`): one row per output time and grain, SI units, space frame.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::{DQuat, DVec3};
 
 use crate::error::FormatError;
-use crate::table::{Damage, Table};
+use crate::table::{Damage, REST, Table, append_cells};
 
 /// Name of the file in a run folder.
 pub const FILE: &str = "grains.csv";
@@ -50,15 +49,9 @@ impl GrainRow {
             .flat_map(|v| v.to_array())
             .chain([q.w, q.x, q.y, q.z])
             .chain(vectors.into_iter().flat_map(|v| v.to_array()));
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{:?},{}", self.time, self.grain);
-        for number in numbers {
-            let _ = write!(text, ",{number:?}");
-        }
-        let _ = match self.contacts {
-            Some(contacts) => writeln!(text, ",{contacts}"),
-            None => writeln!(text, ",NaN"),
-        };
+        *text += &format!("{:?},{}", self.time, self.grain);
+        append_cells(text, numbers);
+        *text += &self.contacts.map_or(",NaN\n".into(), |contacts| format!(",{contacts}\n"));
     }
 }
 
@@ -129,14 +122,8 @@ pub fn read_with(
     });
     let mut read = Vec::with_capacity(table.rows());
     for row in rows {
-        match row {
-            Ok(row) => read.push(row),
-            Err(error) if damage == Damage::Truncate => {
-                notes.push(format!("{error}; this line and all after it were left out"));
-                break;
-            }
-            Err(error) => return Err(error),
-        }
+        let Some(row) = damage.accept(row, REST, notes)? else { break };
+        read.push(row);
     }
     Ok(read)
 }

@@ -23,6 +23,7 @@ pub mod disk;
 mod error;
 pub mod events;
 pub mod grains;
+mod polygonal;
 pub mod poses;
 pub mod probes;
 pub mod pvd;

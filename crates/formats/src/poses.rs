@@ -22,25 +22,8 @@ use crate::table::Table;
 /// Columns of `grains.csv` that say nothing about a pose.
 const IGNORED: [&str; 7] = ["fx", "fy", "fz", "tx", "ty", "tz", "contacts"];
 /// Columns that are read.
-const READ: [&str; 17] = [
-    "time",
-    "grain",
-    "x",
-    "y",
-    "z",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "vx",
-    "vy",
-    "vz",
-    "wx",
-    "wy",
-    "wz",
-    "equivalent_diameter",
-    "density",
-];
+const READ: &str =
+    "time, grain, x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz, equivalent_diameter, density";
 /// Relative tolerance of times.
 const SAME_TIME: f64 = 1e-9;
 /// Largest difference of the length of a quaternion from one.
@@ -82,9 +65,9 @@ pub struct Poses {
 /// [`FormatError`] with the first damaged line, or if no row is at or before `at`.
 pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
     let table = Table::read(file, &mut Vec::new())?;
-    let known = || READ.into_iter().chain(IGNORED);
+    let known = || READ.split(", ").chain(IGNORED);
     if let Some(name) = table.names().iter().find(|name| !known().any(|known| known == **name)) {
-        let what = format!("unknown column '{name}'; known are {}", READ.join(", "));
+        let what = format!("unknown column '{name}'; known are {READ}");
         return Err(FormatError::line(file, 1, what));
     }
     let vector = |names: [&str; 3]| -> Result<Option<[&[f64]; 3]>, FormatError> {

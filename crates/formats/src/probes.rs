@@ -1,9 +1,9 @@
 //! Tables of probes (`probes/NAME.csv`): one row per output time and point, or one per output time
 //! of a plane. SI units, space frame.
 
-use std::fmt::Write as _;
-
 use glam::DVec3;
+
+use crate::table::append_cells;
 
 /// Folder of the tables in a run folder.
 pub const FOLDER: &str = "probes";
@@ -34,9 +34,9 @@ impl PointRow {
     pub fn append_to(&self, text: &mut String) {
         let (x, v) = (self.position, self.velocity);
         let numbers = [x.x, x.y, x.z, v.x, v.y, v.z, self.pressure, self.solid_fraction];
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{:?},{}", self.time, self.point);
-        append_numbers(text, &numbers);
+        *text += &format!("{:?},{}", self.time, self.point);
+        append_cells(text, numbers);
+        text.push('\n');
     }
 }
 
@@ -59,16 +59,10 @@ impl PlaneRow {
     /// Appends the row to a text; numbers are read back exactly.
     pub fn append_to(&self, text: &mut String) {
         let numbers = [self.volume_flux, self.grain_flux, self.solid_fraction, self.pressure];
-        let _ = write!(text, "{:?}", self.time);
-        append_numbers(text, &numbers);
+        *text += &format!("{:?}", self.time);
+        append_cells(text, numbers);
+        text.push('\n');
     }
-}
-
-fn append_numbers(text: &mut String, numbers: &[f64]) {
-    for number in numbers {
-        let _ = write!(text, ",{number:?}");
-    }
-    text.push('\n');
 }
 
 #[cfg(test)]

@@ -142,12 +142,7 @@ pub enum EndReason {
 
 impl fmt::Display for EndReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(match self {
-            EndReason::End => "end",
-            EndReason::Landing => "landing",
-            EndReason::Rest => "rest",
-            EndReason::Separation => "separation",
-        })
+        self.serialize(f)
     }
 }
 

@@ -1,5 +1,6 @@
 //! CSV tables of numbers with named columns.
 
+use std::fmt::{Display, Write as _};
 use std::path::Path;
 
 use crate::error::{FormatError, read_text, unfinished_line};
@@ -11,6 +12,39 @@ pub enum Damage {
     Refuse,
     /// The lines before the damage are kept, and a note says so.
     Truncate,
+}
+
+impl Damage {
+    /// Returns the contents that were read; none after damage that is not refused, with a note that
+    /// `what` was left out.
+    ///
+    /// # Errors
+    /// The damage, if it is refused.
+    pub fn accept<T, E: Display>(
+        self,
+        read: Result<T, E>,
+        what: &str,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<T>, E> {
+        match read {
+            Err(error) if self == Damage::Truncate => {
+                notes.push(format!("{error}; {what} left out"));
+                Ok(None)
+            }
+            read => read.map(Some),
+        }
+    }
+}
+
+/// Part of a table that is left out after a damaged line.
+pub(crate) const REST: &str = "this line and all after it were";
+
+/// Appends numbers to a line of a table, each after a comma; they are read back exactly.
+pub(crate) fn append_cells(line: &mut String, numbers: impl IntoIterator<Item = f64>) {
+    for number in numbers {
+        // Writing to a string cannot fail.
+        let _ = write!(line, ",{number:?}");
+    }
 }
 
 /// Table of numbers; an empty cell is NaN.
@@ -83,14 +117,8 @@ impl Table {
                 };
                 record.iter().zip(&names).map(number).collect::<Result<Vec<f64>, _>>()
             });
-            match row {
-                Ok(row) => columns.iter_mut().zip(row).for_each(|(column, v)| column.push(v)),
-                Err(error) if damage == Damage::Truncate => {
-                    notes.push(format!("{error}; this line and all after it were left out"));
-                    break;
-                }
-                Err(error) => return Err(error),
-            }
+            let Some(row) = damage.accept(row, REST, notes)? else { break };
+            columns.iter_mut().zip(row).for_each(|(column, v)| column.push(v));
         }
         Ok(Table { names, columns })
     }

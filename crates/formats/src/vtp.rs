@@ -2,18 +2,15 @@
 //!
 //! Triangles are written with raw appended data; polygons with ascii or appended data are read.
 
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use glam::DVec3;
 use roxmltree::Document;
 
 use crate::bounded_file::{DATA, read_bytes};
-use crate::disk::write_atomically;
-use crate::vtk_xml::{
-    ArrayElements, ArrayReader, child, close_appended, open_appended, split, write_head,
-    write_length,
-};
+use crate::polygonal::{self, Array};
+use crate::vtk_xml::{ArrayReader, child, split};
 
 /// Triangulated surface.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,54 +32,16 @@ pub struct Surface {
 /// # Errors
 /// Errors of the operating system.
 pub fn write(path: &Path, surface: &Surface) -> io::Result<()> {
-    let (points, triangles) = (surface.points.len(), surface.triangles.len());
-    let (of_points, of_triangles) = (12 * points as u64, 4 * triangles as u64);
-    write_atomically(path, false, |out| {
-        write_head(out, "PolyData", "", surface.time.unwrap_or(f64::NAN))?;
-        writeln!(
-            out,
-            "<Piece NumberOfPoints=\"{points}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" \
-             NumberOfStrips=\"0\" NumberOfPolys=\"{triangles}\">"
-        )?;
-        let mut elements = ArrayElements::default();
-        let element = elements.next("Float32", "Points", 3, of_points);
-        writeln!(out, "<Points>{element}</Points>")?;
-        if surface.velocity.is_some() {
-            let element = elements.next("Float32", "velocity", 3, of_points);
-            writeln!(out, "<PointData>{element}</PointData>")?;
-        }
-        if surface.grains.is_some() {
-            let element = elements.next("Int32", "grain", 1, of_triangles);
-            writeln!(out, "<CellData>{element}</CellData>")?;
-        }
-        let corners = elements.next("Int32", "connectivity", 1, 3 * of_triangles);
-        let ends = elements.next("Int32", "offsets", 1, of_triangles);
-        writeln!(out, "<Polys>{corners}{ends}</Polys>\n</Piece>\n</PolyData>")?;
-        open_appended(out)?;
-        let vectors = [Some(&surface.points), surface.velocity.as_ref()];
-        for vectors in vectors.into_iter().flatten() {
-            write_length(out, of_points)?;
-            write_singles(out, vectors)?;
-        }
-        if let Some(grains) = &surface.grains {
-            write_length(out, of_triangles)?;
-            write_indices(out, grains.iter().copied())?;
-        }
-        write_length(out, 3 * of_triangles)?;
-        write_indices(out, surface.triangles.iter().flatten().copied())?;
-        write_length(out, of_triangles)?;
-        write_indices(out, (1..=triangles).map(|n| 3 * n))?;
-        close_appended(out)
-    })
-}
-
-fn write_singles(out: &mut dyn Write, vectors: &[DVec3]) -> io::Result<()> {
-    let mut numbers = vectors.iter().flat_map(|v| v.as_vec3().to_array());
-    numbers.try_for_each(|value| out.write_all(&value.to_le_bytes()))
-}
-
-fn write_indices(out: &mut dyn Write, mut list: impl Iterator<Item = usize>) -> io::Result<()> {
-    list.try_for_each(|index| out.write_all(&(index as i32).to_le_bytes()))
+    let mut data = Vec::new();
+    if let Some(velocity) = &surface.velocity {
+        data.push(("PointData", vec![Array::vectors("velocity", velocity.iter().copied())]));
+    }
+    if let Some(grains) = &surface.grains {
+        let grains = grains.iter().map(|grain| *grain as i64);
+        data.push(("CellData", vec![Array::integers("grain", grains)]));
+    }
+    let (time, corners) = (surface.time.unwrap_or(f64::NAN), surface.triangles.as_flattened());
+    polygonal::write(path, time, &surface.points, data, ("Polys", 3), corners.iter().copied())
 }
 
 /// Reads a surface; polygons of more than three corners are cut into triangles.

@@ -20,6 +20,9 @@ use crate::error::ReportError;
 pub use facts::Facts;
 pub use history::{History, histories, histories_with};
 
+/// Part that is left out because of damage, for notes.
+const FILE: &str = "the file was";
+
 /// VTK file of a run: a slice of the fields, or surfaces of grains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFile {
@@ -98,13 +101,13 @@ impl RunFolder {
         let mut notes = Vec::new();
         match present("case.resolved.toml") {
             Some(file) => {
-                let facts = usable(facts::read_case(&file), damage, &mut notes)?;
+                let facts = damage.accept(facts::read_case(&file), FILE, &mut notes)?;
                 run.facts = facts.unwrap_or_default();
             }
             None => notes.push("case.resolved.toml is missing: the set-up is not known".to_owned()),
         }
         let mut json = |name: &str| match present(name) {
-            Some(file) => usable(facts::read_json(&file), damage, &mut notes),
+            Some(file) => damage.accept(facts::read_json(&file), FILE, &mut notes),
             None => Ok(None),
         };
         run.summary = json("summary.json")?;
@@ -116,7 +119,7 @@ impl RunFolder {
         match present("grains.csv") {
             Some(file) => {
                 let read = histories_with(&file, &mut notes, damage);
-                run.grains = usable(read, damage, &mut notes)?.unwrap_or_default();
+                run.grains = damage.accept(read, FILE, &mut notes)?.unwrap_or_default();
             }
             None if run.facts.grains.is_empty() => {}
             None => notes
@@ -125,13 +128,13 @@ impl RunFolder {
         match present("diagnostics.csv") {
             Some(file) => {
                 let read = Table::read_with(&file, &mut notes, damage);
-                run.diagnostics = usable(read.map_err(ReportError::from), damage, &mut notes)?;
+                run.diagnostics = damage.accept(read, FILE, &mut notes)?;
             }
             None => notes.push("diagnostics.csv is missing".to_owned()),
         }
         if let Some(file) = present("events.jsonl") {
-            let read = events::read(&file, &mut notes).map_err(ReportError::from);
-            run.events = usable(read, damage, &mut notes)?.unwrap_or_default();
+            let read = events::read(&file, &mut notes);
+            run.events = damage.accept(read, FILE, &mut notes)?.unwrap_or_default();
         }
         run.notes = notes;
         let times = run.collection();
@@ -227,15 +230,12 @@ impl RunFolder {
 
     fn collection(&mut self) -> BTreeMap<String, f64> {
         let file = self.path.join("run.pvd");
-        if !file.is_file() {
-            return BTreeMap::new();
-        }
-        pvd::read(&file)
-            .map(|entries| entries.into_iter().map(|e| (e.file, e.time)).collect())
-            .unwrap_or_else(|what| {
-                self.notes.push(format!("run.pvd could not be read ({what})"));
-                BTreeMap::new()
-            })
+        let entries = if file.is_file() { pvd::read(&file) } else { Ok(Vec::new()) };
+        let entries = entries.unwrap_or_else(|what| {
+            self.notes.push(format!("run.pvd could not be read ({what})"));
+            Vec::new()
+        });
+        entries.into_iter().map(|entry| (entry.file, entry.time)).collect()
     }
 
     /// Lists the files of a subfolder with their times, from `run.pvd` or else from the files.
@@ -254,10 +254,7 @@ impl RunFolder {
         files.sort();
         let mut out = Vec::new();
         for file in files {
-            let name = file
-                .file_name()
-                .map(|name| name.to_string_lossy().into_owned())
-                .unwrap_or_default();
+            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let listed = times.get(&format!("{folder}/{name}")).copied();
             let time = listed.map(Ok).unwrap_or_else(|| time_inside(&file, extension));
             match time {
@@ -267,22 +264,6 @@ impl RunFolder {
         }
         out.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.grain.cmp(&b.grain)));
         out
-    }
-}
-
-/// Returns the contents of a file, or a note instead of its damage unless damage is refused.
-fn usable<T>(
-    read: Result<T, ReportError>,
-    damage: Damage,
-    notes: &mut Vec<String>,
-) -> Result<Option<T>, ReportError> {
-    match read {
-        Ok(contents) => Ok(Some(contents)),
-        Err(error) if damage == Damage::Truncate => {
-            notes.push(format!("{error}; the file was left out"));
-            Ok(None)
-        }
-        Err(error) => Err(error),
     }
 }
 
