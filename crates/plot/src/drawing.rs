@@ -6,7 +6,7 @@ use base64::Engine;
 use resvg::{tiny_skia, usvg};
 
 use crate::font;
-use crate::raster::{Picture, Raster, encode_png};
+use crate::raster::{Picture, Raster};
 use crate::style;
 use crate::text;
 
@@ -240,7 +240,7 @@ impl Drawing {
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
         let scale = style::PIXELS_PER_POINT;
         let size = [self.width, self.height].map(|length| (length * scale).round() as u32);
-        encode_png(size[0], size[1], &self.render(size, scale)?)
+        self.to_picture(size, scale)?.to_print_png()
     }
 
     /// Renders a picture of `size` pixels at `scale` pixels per point, white beyond the drawing.

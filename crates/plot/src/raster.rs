@@ -61,14 +61,27 @@ impl Picture {
     /// # Errors
     /// The reason, if the encoder refuses the picture.
     pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        self.encoded(None)
+    }
+
+    /// Encodes a PNG file that is marked as 300 dots per inch.
+    pub(crate) fn to_print_png(&self) -> Result<Vec<u8>, String> {
+        let per_metre = (300.0 / 0.0254_f64).round() as u32;
+        let unit = png::Unit::Meter;
+        self.encoded(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit }))
+    }
+
+    fn encoded(&self, dimensions: Option<png::PixelDimensions>) -> Result<Vec<u8>, String> {
         let mut out = Vec::new();
         let mut encoder = png::Encoder::new(&mut out, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-        writer.write_image_data(&self.pixels).map_err(|error| error.to_string())?;
-        writer.finish().map_err(|error| error.to_string())?;
-        Ok(out)
+        encoder.set_pixel_dims(dimensions);
+        let written = encoder.write_header().and_then(|mut writer| {
+            writer.write_image_data(&self.pixels)?;
+            writer.finish()
+        });
+        written.map(|()| out).map_err(|error| error.to_string())
     }
 
     /// Decodes a PNG file that [`Picture::to_png`] has encoded.
@@ -113,26 +126,4 @@ impl Picture {
         }
         Picture { width, height, pixels }
     }
-}
-
-/// Encodes an opaque pixmap as RGB PNG, marked as 300 dots per inch.
-///
-/// # Errors
-/// The reason, if the encoder refuses the image.
-pub fn encode_png(width: u32, height: u32, pixmap: &tiny_skia::Pixmap) -> Result<Vec<u8>, String> {
-    let pixels: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let per_metre = (300.0 / 0.0254_f64).round() as u32;
-    encoder.set_pixel_dims(Some(png::PixelDimensions {
-        xppu: per_metre,
-        yppu: per_metre,
-        unit: png::Unit::Meter,
-    }));
-    let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
-    writer.write_image_data(&pixels).map_err(|error| error.to_string())?;
-    writer.finish().map_err(|error| error.to_string())?;
-    Ok(out)
 }

@@ -1,5 +1,6 @@
 //! Errors of a report.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::FormatError;
@@ -33,8 +34,25 @@ pub enum ReportError {
         /// File.
         file: PathBuf,
         /// Error of the operating system, or reason why the figure could not be drawn.
-        source: std::io::Error,
+        source: io::Error,
     },
+}
+
+/// Adds the file to the error of a write, or of a drawing for it.
+pub(crate) trait Written<T> {
+    fn written(self, file: &Path) -> Result<T, ReportError>;
+}
+
+impl<T> Written<T> for io::Result<T> {
+    fn written(self, file: &Path) -> Result<T, ReportError> {
+        self.map_err(|source| ReportError::Write { file: file.into(), source })
+    }
+}
+
+impl<T> Written<T> for Result<T, String> {
+    fn written(self, file: &Path) -> Result<T, ReportError> {
+        self.map_err(io::Error::other).written(file)
+    }
 }
 
 /// Describes why a path is no run folder.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use grainwake_formats::disk::write_atomically;
 use grainwake_plot::Figure;
 
-use crate::error::ReportError;
+use crate::error::{ReportError, Written as _};
 
 /// A figure with its files.
 #[derive(Clone, Debug)]
@@ -33,16 +33,11 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 /// # Errors
 /// If the figure cannot be drawn, or a file cannot be written.
 pub fn write_figure(folder: &Path, figure: Figure) -> Result<WrittenFigure, ReportError> {
-    let write = |extension: &str, bytes: std::io::Result<Vec<u8>>| {
-        let file = folder.join(format!("{}.{extension}", figure.name));
-        match bytes.and_then(|bytes| write_file(&file, &bytes)) {
-            Ok(()) => Ok(file),
-            Err(source) => Err(ReportError::Write { file, source }),
-        }
-    };
-    let png = figure.drawing.to_png().map_err(std::io::Error::other);
-    let png_file = write("png", png)?;
+    let [png_file, svg_file] =
+        ["png", "svg"].map(|extension| folder.join(format!("{}.{extension}", figure.name)));
+    let png = figure.drawing.to_png().written(&png_file)?;
+    write_file(&png_file, &png).written(&png_file)?;
     let svg = figure.svg();
-    let svg_file = write("svg", Ok(svg.clone().into_bytes()))?;
+    write_file(&svg_file, svg.as_bytes()).written(&svg_file)?;
     Ok(WrittenFigure { figure, svg, png_file, svg_file })
 }

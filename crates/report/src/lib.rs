@@ -21,6 +21,7 @@ pub mod run_folder;
 mod testing;
 pub mod thumbnail;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
@@ -29,7 +30,9 @@ pub use film::{Film, write_film};
 use grainwake_formats::disk;
 use grainwake_plot::Figure;
 
+use error::Written as _;
 use features::RunFeatures;
+use figure::GrainSurface;
 use run_folder::RunFolder;
 
 /// Files of a report.
@@ -64,15 +67,22 @@ pub struct RunReport {
 /// # Errors
 /// If the folder holds no run, or a table or log cannot be read.
 pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
-    let mut run = RunFolder::open(run_dir)?;
-    let mut notes = std::mem::take(&mut run.notes);
-    let surfaces = figure::surfaces(&run, &mut notes);
-    let diameter =
-        |(grain, body): (&usize, &figure::GrainSurface)| Some((*grain, body.diameter()?));
-    run.facts.add_diameters(surfaces.iter().filter_map(diameter));
+    let (run, surfaces, mut notes) = read_with_surfaces(run_dir)?;
     let features = RunFeatures::of(&run);
     let figures = figure::all(&run, &features, surfaces, &mut notes);
     Ok(RunReport { run, features, figures, notes })
+}
+
+/// Reads a run folder with the surfaces of its grains, by index, and its notes.
+fn read_with_surfaces(
+    run_dir: &Path,
+) -> Result<(RunFolder, BTreeMap<usize, GrainSurface>, Vec<String>), ReportError> {
+    let mut run = RunFolder::open(run_dir)?;
+    let mut notes = std::mem::take(&mut run.notes);
+    let surfaces = figure::surfaces(&run, &mut notes);
+    let diameter = |(grain, body): (&usize, &GrainSurface)| Some((*grain, body.diameter()?));
+    run.facts.add_diameters(surfaces.iter().filter_map(diameter));
+    Ok((run, surfaces, notes))
 }
 
 /// Writes the figures and the page of a run folder.
@@ -82,18 +92,14 @@ pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
 pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
     let RunReport { run, features, figures, notes } = read_report(run_dir)?;
     let folder = run_dir.join("figures");
-    let failed = |file: &Path| {
-        let file = file.to_owned();
-        move |source| ReportError::Write { file, source }
-    };
-    disk::create_folder(&folder).map_err(failed(&folder))?;
+    disk::create_folder(&folder).written(&folder)?;
     let figures = figures.into_iter().zip(1..);
     let figures: Vec<WrittenFigure> = figures
         .map(|(figure, number)| write_figure(&folder, figure.numbered(number)))
         .collect::<Result<_, _>>()?;
     let page = run_dir.join("report.html");
     let text = page::page(&run, &features, &figures, &notes);
-    write_file(&page, text.as_bytes()).map_err(failed(&page))?;
+    write_file(&page, text.as_bytes()).written(&page)?;
     Ok(ReportFiles {
         page,
         png: figures.iter().map(|f| f.png_file.clone()).collect(),

@@ -14,11 +14,11 @@ use grainwake_plot::Drawing;
 use grainwake_plot::animation::encode_gif;
 use grainwake_plot::raster::Picture;
 
-use crate::error::ReportError;
+use crate::error::{ReportError, Written as _};
 use crate::features::RunFeatures;
-use crate::figure::{self, Scene};
+use crate::figure::Scene;
 use crate::files::write_file;
-use crate::run_folder::RunFolder;
+use crate::read_with_surfaces;
 
 /// Smallest number of pictures of a film.
 pub const MIN_FRAMES: usize = 8;
@@ -74,12 +74,7 @@ trait View {
 /// If the folder holds no run, a table or log cannot be read, there are too few moments to show, or
 /// a file cannot be written.
 pub fn write_film(run_dir: &Path) -> Result<Film, ReportError> {
-    let mut run = RunFolder::open(run_dir)?;
-    let mut notes = std::mem::take(&mut run.notes);
-    let surfaces = figure::surfaces(&run, &mut notes);
-    let diameter =
-        |(grain, body): (&usize, &figure::GrainSurface)| Some((*grain, body.diameter()?));
-    run.facts.add_diameters(surfaces.iter().filter_map(diameter));
+    let (run, surfaces, mut notes) = read_with_surfaces(run_dir)?;
     let features = RunFeatures::of(&run);
     let scene = Scene { run: &run, features: &features, surfaces, instants: Vec::new() };
     let wet = !run.slices.is_empty();
@@ -97,20 +92,10 @@ pub fn write_film(run_dir: &Path) -> Result<Film, ReportError> {
     let mut film = write_frames(&*view, folder)?;
     film.notes = notes;
     film.file = run_dir.join(FILE);
-    let gif = shrunk_gif(&mut film, MAX_BYTES).map_err(failed(&film.file))?;
+    let gif = shrunk_gif(&mut film, MAX_BYTES).written(&film.file)?;
     film.bytes = gif.len();
-    write_file(&film.file, &gif).map_err(failed_write(&film.file))?;
+    write_file(&film.file, &gif).written(&film.file)?;
     Ok(film)
-}
-
-fn failed_write(file: &Path) -> impl Fn(std::io::Error) -> ReportError {
-    let file = file.to_owned();
-    move |source| ReportError::Write { file: file.clone(), source }
-}
-
-fn failed(file: &Path) -> impl Fn(String) -> ReportError {
-    let file = file.to_owned();
-    move |why| ReportError::Write { file: file.clone(), source: std::io::Error::other(why) }
 }
 
 /// Path of a picture; numbers start at 1.
@@ -120,25 +105,24 @@ fn frame_file(folder: &Path, index: usize) -> PathBuf {
 
 /// Draws all pictures into `folder`, in place of those of an earlier film.
 fn write_frames(view: &dyn View, folder: PathBuf) -> Result<Film, ReportError> {
-    disk::create_folder(&folder).map_err(failed_write(&folder))?;
+    disk::create_folder(&folder).written(&folder)?;
     let times = view.times();
     let mut size = [0, 0];
     let mut scale = 1.0;
     for index in 0..times.len() {
         let file = frame_file(&folder, index);
-        let drawing = view.draw(index).map_err(failed(&file))?;
+        let drawing = view.draw(index).written(&file)?;
         if index == 0 {
             let (width, height) = (drawing.width(), drawing.height());
             scale = (MAX_SIZE[0] / width).min(MAX_SIZE[1] / height).min(MAX_SCALE);
             // Video codecs need even sizes.
             size = [width, height].map(|length| 2 * (0.5 * length * scale).floor() as u32);
         }
-        let picture = drawing.to_picture(size, scale).map_err(failed(&file))?;
-        let png = picture.to_png().map_err(failed(&file))?;
-        write_file(&file, &png).map_err(failed_write(&file))?;
+        let picture = drawing.to_picture(size, scale).written(&file)?;
+        write_file(&file, &picture.to_png().written(&file)?).written(&file)?;
     }
     for old in (times.len()..).map(|index| frame_file(&folder, index)).take_while(|f| f.is_file()) {
-        disk::remove_file(&old).map_err(failed_write(&old))?;
+        disk::remove_file(&old).written(&old)?;
     }
     let count = times.len();
     let span = times[count - 1] - times[0];
