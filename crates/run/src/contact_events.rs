@@ -22,51 +22,53 @@ struct OpenContact<K> {
     apart_since: Option<f64>,
 }
 
-/// Beginning or end of a contact.
-struct Change<K> {
-    bodies: K,
-    begins: bool,
-    /// Time of the change [s].
-    time: f64,
-}
-
-/// Updates the contacts with the bodies that touch after a step, and returns the changes. Bodies
-/// are separated after `hold` [s] without contact.
-fn changes<K: Copy + Ord>(
-    open: &mut Vec<OpenContact<K>>,
-    mut touching: BTreeSet<K>,
-    time: f64,
-    hold: f64,
-) -> Vec<Change<K>> {
-    let mut changes = Vec::new();
-    open.retain_mut(|contact| {
-        if touching.remove(&contact.bodies) {
-            contact.apart_since = None;
-            return true;
-        }
-        let since = *contact.apart_since.get_or_insert(time);
-        let parted = time - since >= hold;
-        if parted {
-            changes.push(Change { bodies: contact.bodies, begins: false, time: since });
-        }
-        !parted
-    });
-    for bodies in touching {
-        changes.push(Change { bodies, begins: true, time });
-        open.push(OpenContact { bodies, apart_since: None });
-    }
-    changes
-}
-
-/// Contacts between grains and their events; part of a checkpoint.
+/// Contacts between bodies and their events; part of a checkpoint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ContactEvents {
-    open: Vec<OpenContact<[usize; 2]>>,
+pub struct ContactEvents<K> {
+    open: Vec<OpenContact<K>>,
     /// All events.
     pub(crate) events: Vec<Event>,
 }
 
-impl ContactEvents {
+/// Contacts between two grains.
+pub type PairEvents = ContactEvents<[usize; 2]>;
+/// Contacts with walls: grain, axis and side of each.
+pub type WallEvents = ContactEvents<(usize, u8, u8)>;
+
+impl<K: Copy + Ord> ContactEvents<K> {
+    /// Updates the contacts with the bodies that touch after a step, and returns the new events.
+    /// `event` gives those of the beginning or the end of a contact at a time [s]. Bodies are
+    /// separated after `hold` [s] without contact.
+    fn update_with(
+        &mut self,
+        time: f64,
+        mut touching: BTreeSet<K>,
+        hold: f64,
+        event: impl Fn(K, bool, f64) -> Event,
+    ) -> Vec<Event> {
+        let mut new = Vec::new();
+        self.open.retain_mut(|contact| {
+            if touching.remove(&contact.bodies) {
+                contact.apart_since = None;
+                return true;
+            }
+            let since = *contact.apart_since.get_or_insert(time);
+            let parted = time - since >= hold;
+            if parted {
+                new.push(Event { confirmed: time, ..event(contact.bodies, false, since) });
+            }
+            !parted
+        });
+        for bodies in touching {
+            new.push(event(bodies, true, time));
+            self.open.push(OpenContact { bodies, apart_since: None });
+        }
+        self.events.extend_from_slice(&new);
+        new
+    }
+}
+
+impl PairEvents {
     /// Updates the pairs with the contacts after a step and returns the new events. Grains are
     /// separated after `hold` [s] without contact.
     pub(crate) fn update(&mut self, time: f64, contacts: &[Contact], hold: f64) -> Vec<Event> {
@@ -76,23 +78,11 @@ impl ContactEvents {
             }
             _ => None,
         });
-        let first = self.events.len();
-        for change in changes(&mut self.open, pairs.collect(), time, hold) {
-            let kind = if change.begins { EventKind::Kiss } else { EventKind::Separation };
-            let event = Event::new(kind, change.time, &change.bodies);
-            self.events.push(Event { confirmed: time, ..event });
-        }
-        self.events[first..].to_vec()
+        self.update_with(time, pairs.collect(), hold, |grains, begins, at| {
+            let kind = if begins { EventKind::Kiss } else { EventKind::Separation };
+            Event::new(kind, at, &grains)
+        })
     }
-}
-
-/// Contacts of grains with walls and their events; part of a checkpoint.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct WallEvents {
-    /// Grain, axis and side of each contact.
-    open: Vec<OpenContact<(usize, u8, u8)>>,
-    /// All events.
-    pub(crate) events: Vec<Event>,
 }
 
 impl WallEvents {
@@ -103,16 +93,11 @@ impl WallEvents {
             Partner::Wall { axis, side } => Some((contact.grain, axis, side)),
             Partner::Grain(_) => None,
         });
-        let first = self.events.len();
-        for change in changes(&mut self.open, touching.collect(), time, hold) {
-            let kind =
-                if change.begins { EventKind::WallContact } else { EventKind::WallSeparation };
-            let (grain, axis, side) = change.bodies;
-            let event = Event::new(kind, change.time, &[grain]);
+        self.update_with(time, touching.collect(), hold, |(grain, axis, side), begins, at| {
+            let kind = if begins { EventKind::WallContact } else { EventKind::WallSeparation };
             let wall = Some(wall_name(axis, side).to_owned());
-            self.events.push(Event { wall, confirmed: time, ..event });
-        }
-        self.events[first..].to_vec()
+            Event { wall, ..Event::new(kind, at, &[grain]) }
+        })
     }
 }
 
@@ -136,7 +121,7 @@ mod tests {
 
     #[test]
     fn grains_touch_part_and_touch_again() {
-        let mut contacts_of_grains = ContactEvents::default();
+        let mut contacts_of_grains = PairEvents::default();
         let mut events: Vec<(EventKind, f64, Vec<usize>)> = Vec::new();
         let floor = Contact { partner: Partner::Wall { axis: 2, side: 0 }, ..touch(1, 0) };
         let steps = [

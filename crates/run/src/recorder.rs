@@ -8,10 +8,8 @@ use grainwake_formats::pvd::{self, Entry};
 use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Scales, Summary};
 use grainwake_solver::sim::Simulation;
 
-use crate::contact_events::{ContactEvents, MAX_GRAINS, WallEvents};
-use crate::contact_work::ContactWork;
+use crate::contact_events::{MAX_GRAINS, WallEvents};
 use crate::error::{Context, RunError};
-use crate::overlaps::Overlaps;
 use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
 use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files};
@@ -24,29 +22,21 @@ const INDEX: &str = "run.pvd";
 /// Recorder of a run: tables, VTK files, events, checkpoints.
 pub(crate) struct Recorder {
     run: PathBuf,
-    digest: String,
     end: f64,
     at_events: bool,
     tables: Tables,
     vtk: VtkOutput,
     watch: Watch,
-    contact_events: ContactEvents,
-    /// Contacts with walls, if they are events.
-    wall_events: Option<WallEvents>,
+    /// Whether contacts with walls are events.
+    with_walls: bool,
     series: Vec<Series>,
     extra: Vec<ExtraTable>,
-    /// Times of the last rows of the extra tables [s].
-    last_extra_rows: Vec<Option<f64>>,
-    vtk_files: Vec<Entry>,
     /// Number of VTK files whose content is on the disk.
     synced_vtk_files: usize,
-    max_divergence: f64,
-    max_cfl: f64,
-    overlaps: Overlaps,
-    contact_work: ContactWork,
     scales: Option<Scales>,
-    last_row: Option<f64>,
     kept_checkpoints: usize,
+    /// Record of the next checkpoint; its time, tables, series and tracker are set with it.
+    record: Record,
 }
 
 impl Recorder {
@@ -59,28 +49,23 @@ impl Recorder {
     ) -> Recorder {
         let extra = ExtraTable::all(plan);
         let intervals: Vec<f64> = extra.iter().map(ExtraTable::interval).collect();
+        let watch = Watch::new(sim, plan.stop);
+        let mut record = Record::new(digest, sim, watch.tracker.state());
+        record.last_extra_rows = vec![None; extra.len()];
         Recorder {
             run: run.into(),
-            digest: digest.into(),
             end: plan.end,
             at_events: plan.at_events && sim.grains().len() <= 2,
             tables,
             vtk: VtkOutput::new(&plan.planes, sim),
-            watch: Watch::new(sim, plan.stop),
-            contact_events: ContactEvents::default(),
-            wall_events: plan.wall_events.then(WallEvents::default),
+            watch,
+            with_walls: plan.wall_events,
             series: Series::of(plan, &intervals),
-            last_extra_rows: vec![None; extra.len()],
             extra,
-            vtk_files: Vec::new(),
             synced_vtk_files: 0,
-            max_divergence: sim.max_divergence(),
-            max_cfl: 0.0,
-            overlaps: Overlaps::default(),
-            contact_work: ContactWork::default(),
             scales: plan.scales,
-            last_row: None,
             kept_checkpoints: plan.kept_during_run(),
+            record,
         }
     }
 
@@ -105,16 +90,18 @@ impl Recorder {
     pub fn branch(
         run: &Path,
         digest: &str,
-        record: Record,
+        parent: Record,
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
         let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
         let mut recorder = Recorder::build(run, digest, plan, sim, tables);
-        recorder.watch.tracker.restore(record.tracker);
-        recorder.contact_events = record.contact_events;
-        recorder.restore_wall_events(record.wall_events);
-        recorder.overlaps.mean_now = record.overlaps.mean_now;
+        recorder.watch.tracker.restore(parent.tracker);
+        recorder.record.contact_events = parent.contact_events;
+        if recorder.with_walls {
+            recorder.record.wall_events = parent.wall_events;
+        }
+        recorder.record.overlaps.mean_now = parent.overlaps.mean_now;
         recorder.series.iter_mut().for_each(|series| series.start_after(sim.time()));
         let events = recorder.events();
         recorder.tables.append_events(&events)?;
@@ -138,39 +125,25 @@ impl Recorder {
     /// Continues the record of a run from a checkpoint.
     pub fn resume(
         run: &Path,
-        record: Record,
+        mut record: Record,
         plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = {
-            let extra = ExtraTable::all(plan);
-            Tables::reopen(run, &record.lengths, &extra, plan.scales.as_ref())?
-        };
+        let extra = ExtraTable::all(plan);
+        let tables = Tables::reopen(run, &record.lengths, &extra, plan.scales.as_ref())?;
         let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
-        recorder.watch.tracker.restore(record.tracker);
-        recorder.contact_events = record.contact_events;
-        recorder.restore_wall_events(record.wall_events);
-        for (series, next) in recorder.series.iter_mut().zip(record.next) {
-            series.next = next;
+        recorder.watch.tracker.restore(record.tracker.clone());
+        for (series, next) in recorder.series.iter_mut().zip(&record.next) {
+            series.next = *next;
         }
-        for (last, row) in recorder.last_extra_rows.iter_mut().zip(record.last_extra_rows) {
-            *last = row;
+        record.last_extra_rows.resize(extra.len(), None);
+        if !recorder.with_walls {
+            record.wall_events = WallEvents::default();
         }
-        recorder.vtk_files = record.vtk_files;
-        recorder.synced_vtk_files = recorder.vtk_files.len();
-        recorder.max_divergence = record.max_divergence;
-        recorder.max_cfl = record.max_cfl;
-        recorder.overlaps = record.overlaps;
-        recorder.contact_work = record.contact_work;
-        recorder.last_row = record.last_row;
+        recorder.synced_vtk_files = record.vtk_files.len();
+        recorder.record = record;
         recorder.write_collection()?;
         Ok(recorder)
-    }
-
-    fn restore_wall_events(&mut self, recorded: WallEvents) {
-        if let Some(events) = &mut self.wall_events {
-            *events = recorded;
-        }
     }
 
     /// Returns the time from `now` to the next output or the end [s]; `step` [s] is the usual step.
@@ -181,19 +154,20 @@ impl Recorder {
     /// Updates the record with the state after a step, writes the outputs that are due, and returns
     /// the new events.
     pub fn after_step(&mut self, sim: &Simulation) -> Result<Vec<Event>, RunError> {
-        self.max_divergence = self.max_divergence.max(sim.max_divergence());
-        self.max_cfl = self.max_cfl.max(sim.cfl());
-        self.overlaps.add(sim);
-        self.contact_work.add(sim);
+        let record = &mut self.record;
+        record.max_divergence = record.max_divergence.max(sim.max_divergence());
+        record.max_cfl = record.max_cfl.max(sim.cfl());
+        record.overlaps.add(sim);
+        record.contact_work.add(sim);
         let before = self.watch.tracker.events().len();
         let mut events = self.watch.update(sim);
+        let (time, contacts, hold) = (sim.time(), sim.contacts(), self.watch.separation_hold);
         if (3..=MAX_GRAINS).contains(&sim.grains().len()) {
-            let hold = self.watch.separation_hold;
-            events.extend((self.contact_events).update(sim.time(), sim.contacts(), hold));
+            events.extend(record.contact_events.update(time, contacts, hold));
         }
         let of_grains = events.len();
-        if let Some(walls) = &mut self.wall_events {
-            events.extend(walls.update(sim.time(), sim.contacts(), self.watch.separation_hold));
+        if self.with_walls {
+            events.extend(record.wall_events.update(time, contacts, hold));
         }
         self.tables.append_events(&events)?;
         self.write_due(sim)?;
@@ -252,36 +226,36 @@ impl Recorder {
     }
 
     fn append_rows(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        self.tables.append_rows(sim, self.watch.tracker.gap(), &self.overlaps)?;
-        self.overlaps.largest_since_row = 0.0;
-        self.last_row = Some(sim.time());
+        self.tables.append_rows(sim, self.watch.tracker.gap(), &self.record.overlaps)?;
+        self.record.overlaps.largest_since_row = 0.0;
+        self.record.last_row = Some(sim.time());
         Ok(())
     }
 
     /// Appends rows of the present state to an extra table.
     fn append_extra(&mut self, table: usize, sim: &Simulation) -> Result<(), RunError> {
         self.tables.append_extra(table, &self.extra[table].rows(sim))?;
-        self.last_extra_rows[table] = Some(sim.time());
+        self.record.last_extra_rows[table] = Some(sim.time());
         Ok(())
     }
 
     fn add(&mut self, files: impl IntoIterator<Item = Entry>) -> Result<(), RunError> {
-        self.vtk_files.extend(files);
+        self.record.vtk_files.extend(files);
         self.write_collection()
     }
 
     /// Writes the index of the VTK files, unless there are none.
     fn write_collection(&self) -> Result<(), RunError> {
-        if self.vtk_files.is_empty() {
+        if self.record.vtk_files.is_empty() {
             return Ok(());
         }
         let path = self.run.join(INDEX);
-        pvd::write(&path, &self.vtk_files).context("write", &path)
+        pvd::write(&path, &self.record.vtk_files).context("write", &path)
     }
 
     /// Writes the outputs of the last state, unless they have been written.
     pub fn finish(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        if self.last_row != Some(sim.time()) {
+        if self.record.last_row != Some(sim.time()) {
             self.append_rows(sim)?;
             let slices = self.vtk.slices(&self.run, sim, "end")?;
             let grains = self.vtk.grains(&self.run, sim, "end")?;
@@ -295,7 +269,7 @@ impl Recorder {
             let series = &self.series[index];
             if let Content::Extra(table) = series.content
                 && series.is_on()
-                && self.last_extra_rows[table] != Some(sim.time())
+                && self.record.last_extra_rows[table] != Some(sim.time())
             {
                 self.append_extra(table, sim)?;
             }
@@ -305,36 +279,25 @@ impl Recorder {
 
     /// Makes the VTK files and their index durable.
     fn sync_vtk_files(&mut self) -> Result<(), RunError> {
-        let new = self.vtk_files[self.synced_vtk_files..].iter().map(|entry| entry.file.as_str());
-        let index = (!self.vtk_files.is_empty()).then_some(INDEX);
+        let all = &self.record.vtk_files;
+        let new = all[self.synced_vtk_files..].iter().map(|entry| entry.file.as_str());
+        let index = (!all.is_empty()).then_some(INDEX);
         for path in new.chain(index).map(|file| self.run.join(file)) {
             disk::sync_file(&path).context("write", &path)?;
         }
-        self.synced_vtk_files = self.vtk_files.len();
+        self.synced_vtk_files = all.len();
         Ok(())
     }
 
     /// Writes a checkpoint. All files that it refers to are durable before it is.
     pub fn checkpoint(&mut self, sim: &Simulation) -> Result<(), RunError> {
         self.sync_vtk_files()?;
-        let record = Record {
-            digest: self.digest.clone(),
-            time: sim.time(),
-            steps: sim.steps(),
-            lengths: self.tables.sync()?,
-            next: self.series.iter().map(|series| series.next).collect(),
-            last_extra_rows: self.last_extra_rows.clone(),
-            vtk_files: self.vtk_files.clone(),
-            max_divergence: self.max_divergence,
-            max_cfl: self.max_cfl,
-            overlaps: self.overlaps,
-            contact_work: self.contact_work,
-            last_row: self.last_row,
-            tracker: self.watch.tracker.state().clone(),
-            contact_events: self.contact_events.clone(),
-            wall_events: self.wall_events.clone().unwrap_or_default(),
-        };
-        checkpoint::write(&self.run, &record, sim, self.kept_checkpoints)
+        let record = &mut self.record;
+        (record.time, record.steps) = (sim.time(), sim.steps());
+        record.lengths = self.tables.sync()?;
+        record.next = self.series.iter().map(|series| series.next).collect();
+        record.tracker = self.watch.tracker.state().clone();
+        checkpoint::write(&self.run, record, sim, self.kept_checkpoints)
     }
 
     /// Returns the watch of events and stop condition.
@@ -345,8 +308,8 @@ impl Recorder {
     /// Returns all events in the order of their confirmation.
     fn events(&self) -> Vec<Event> {
         let mut events = self.watch.tracker.events().to_vec();
-        events.extend_from_slice(&self.contact_events.events);
-        events.extend(self.wall_events.iter().flat_map(|walls| walls.events.iter().cloned()));
+        events.extend_from_slice(&self.record.contact_events.events);
+        events.extend_from_slice(&self.record.wall_events.events);
         // The sort is stable: events of one step keep the order of the log.
         events.sort_by(|a, b| a.confirmed.total_cmp(&b.confirmed));
         events
@@ -367,12 +330,12 @@ impl Recorder {
             end_time_s: sim.time(),
             cost,
             events: self.events(),
-            max_divergence: self.max_divergence,
-            max_cfl: self.max_cfl,
-            max_overlap: self.overlaps.largest,
-            mean_overlap: self.overlaps.mean(),
-            substeps: self.contact_work.substeps(),
-            contact_pairs: self.contact_work.pairs(),
+            max_divergence: self.record.max_divergence,
+            max_cfl: self.record.max_cfl,
+            max_overlap: self.record.overlaps.largest,
+            mean_overlap: self.record.overlaps.mean(),
+            substeps: self.record.contact_work.substeps(),
+            contact_pairs: self.record.contact_work.pairs(),
             scales: self.scales,
             ended_by,
             pair: tracker.phase().map(|phase| PairSummary {

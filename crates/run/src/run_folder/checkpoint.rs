@@ -19,7 +19,7 @@ use grainwake_solver::sim::events::TrackerState;
 
 use super::ExtraTable;
 use super::tables::Lengths;
-use crate::contact_events::{ContactEvents, WallEvents};
+use crate::contact_events::{PairEvents, WallEvents};
 use crate::contact_work::ContactWork;
 use crate::error::{Context, RunError};
 use crate::number_format::quantity;
@@ -71,7 +71,30 @@ pub struct Record {
     pub wall_events: WallEvents,
     /// Contacts between three and more grains.
     #[serde(default, rename = "meetings")]
-    pub contact_events: ContactEvents,
+    pub contact_events: PairEvents,
+}
+
+impl Record {
+    /// Returns the record of a run of the case with this hash, before its first step.
+    pub(crate) fn new(digest: &str, sim: &Simulation, tracker: &TrackerState) -> Record {
+        Record {
+            digest: digest.into(),
+            time: sim.time(),
+            steps: sim.steps(),
+            lengths: Lengths::default(),
+            next: Vec::new(),
+            vtk_files: Vec::new(),
+            max_divergence: sim.max_divergence(),
+            max_cfl: 0.0,
+            overlaps: Overlaps::default(),
+            contact_work: ContactWork::default(),
+            last_row: None,
+            last_extra_rows: Vec::new(),
+            tracker: tracker.clone(),
+            wall_events: WallEvents::default(),
+            contact_events: PairEvents::default(),
+        }
+    }
 }
 
 /// Writer that hashes what it passes on.
