@@ -61,9 +61,6 @@ impl RunPlan {
     pub(crate) fn kept_after_end(&self) -> usize {
         self.checkpoint_keep.unwrap_or(1)
     }
-}
-
-impl RunPlan {
     /// Returns the intervals of all outputs that are turned on [s].
     pub fn intervals(&self) -> impl Iterator<Item = f64> {
         let tables = [self.tables, self.contacts];

@@ -1,10 +1,11 @@
 //! Errors of a study, reading of tables and writing of files in one piece.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk::write_atomically;
 use grainwake_report::ReportError;
-use grainwake_run::case::{CaseError, Problem, nearest};
+use grainwake_run::case::{CaseError, Problem};
 
 /// Reason why a study cannot be read, planned or stored.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +21,7 @@ pub enum StudyError {
         source: std::io::Error,
     },
     /// The contents of the study file are wrong.
-    #[error("{}", list(.0))]
+    #[error("{}", Problem::list(.0))]
     Invalid(Vec<Problem>),
     /// A case is wrong independently of the study.
     #[error(transparent)]
@@ -44,11 +45,6 @@ pub enum StudyError {
         /// The error in it.
         what: String,
     },
-}
-
-fn list(problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
-    lines.join("\n")
 }
 
 impl From<Problem> for StudyError {
@@ -78,10 +74,20 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
 /// # Errors
 /// [`StudyError::Damaged`] with the line of the damage.
 pub(crate) fn read_rows<T: serde::de::DeserializeOwned>(file: &Path) -> Result<Vec<T>, StudyError> {
-    let text = match std::fs::read(file) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        text => text.at("read", file)?,
-    };
+    match read_json(file) {
+        Err(StudyError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {
+            Ok(Vec::new())
+        }
+        rows => rows,
+    }
+}
+
+/// Reads a JSON file of the study folder.
+///
+/// # Errors
+/// [`StudyError::Damaged`] with the line of the damage.
+pub(crate) fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Result<T, StudyError> {
+    let text = std::fs::read(file).at("read", file)?;
     serde_json::from_slice(&text)
         .map_err(|error| StudyError::Damaged { file: file.into(), what: error.to_string() })
 }
@@ -98,9 +104,4 @@ pub(crate) fn refer_to_study_keys(mut problem: Problem) -> Problem {
     problem.help =
         problem.help.map(|help| help.replace("`grainwake schema` lists every key", here));
     problem
-}
-
-/// Returns the question after the nearest known name; empty if none is near.
-pub(crate) fn did_you_mean<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
-    nearest(name, known).map_or(String::new(), |n| format!("did you mean \"{n}\"? "))
 }

@@ -56,6 +56,10 @@ impl Problem {
         self.excerpt = Some(Box::new(Excerpt { source, label: label.into(), span }));
         self
     }
+    /// Returns one line per problem.
+    pub fn list(problems: &[Problem]) -> String {
+        problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")
+    }
     /// Returns file, line and column of the position; lines and columns count from 1.
     pub fn place(&self) -> Option<(&str, usize, usize)> {
         let Excerpt { source, span, .. } = self.excerpt.as_deref()?;
@@ -104,13 +108,8 @@ pub enum CaseError {
         source: std::io::Error,
     },
     /// The contents are wrong.
-    #[error("{}", list(.0))]
+    #[error("{}", Problem::list(.0))]
     Invalid(Vec<Problem>),
-}
-
-fn list(problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
-    lines.join("\n")
 }
 
 impl CaseError {

@@ -50,7 +50,7 @@ pub use located::Located;
 pub use schema::schema;
 pub use shapes::ShapeFile;
 pub use source::Source;
-pub use suggest::nearest;
+pub use suggest::{did_you_mean, nearest};
 
 use raw::{RawCase, RawExpect, RawRun};
 

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 
 use super::error::Problem;
 use super::overrides::{override_line, override_table, remove_key};
-use super::suggest::nearest;
+use super::suggest::{did_you_mean, nearest};
 use super::toml_messages::{plainly, wrong_kind};
 
 /// TOML file with its `key=value` overrides. Spans count as if the overrides followed the file, so
@@ -166,6 +166,17 @@ impl Source {
         }
     }
 
+    /// Returns a problem of the value at `span`, with its remedy, position and key.
+    pub fn problem(
+        &self,
+        message: impl Into<String>,
+        help: impl Into<String>,
+        span: Option<&Range<usize>>,
+        label: &str,
+    ) -> Problem {
+        self.locate(Problem::new(message).help(help), span, label)
+    }
+
     /// Rewords an error of the TOML reader in the terms of the file.
     fn located(&self, error: &toml::de::Error) -> Problem {
         let message = error.message();
@@ -199,8 +210,7 @@ impl Source {
                 Some(format!("add `{key} = ...`; `grainwake schema` lists every key")),
             ),
             [word, ref known @ ..] if message.starts_with("unknown variant") => {
-                let hint = nearest(word, known.iter().copied())
-                    .map_or(String::new(), |hint| format!("did you mean \"{hint}\"? "));
+                let hint = did_you_mean(word, known.iter().copied());
                 let help = format!("{hint}Accepted: {}", known.join(", "));
                 (format!("unknown value \"{word}\""), "not accepted".into(), Some(help))
             }

@@ -12,6 +12,11 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     (distance <= reach).then_some(best)
 }
 
+/// The question after the nearest candidate, with a blank at its end; empty if none is near.
+pub fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(word, candidates).map_or(String::new(), |near| format!("did you mean \"{near}\"? "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::nearest;

@@ -25,11 +25,7 @@ pub enum Verdict {
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(match self {
-            Verdict::Holds => "holds",
-            Verdict::Contradicted => "contradicted",
-            Verdict::Open => "open",
-        })
+        self.serialize(f)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use grainwake_run::case::{Located, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source, did_you_mean};
 use serde::Deserialize;
 
 use super::claims::{
@@ -11,7 +11,7 @@ use super::claims::{
 };
 use super::expand::Model;
 use super::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES, SHAPE_FACTORS};
-use crate::error::{did_you_mean, refer_to_study_keys};
+use crate::error::refer_to_study_keys;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -66,9 +66,8 @@ impl NameCheck<'_> {
             return true;
         }
         let hint = did_you_mean(name, known.iter().copied());
-        let problem = Problem::new(format!("there is no {kind} \"{name}\""))
-            .help(format!("{hint}known names: {}", known.join(", ")));
-        self.problems.push(self.source.locate(problem, span, "here"));
+        let help = format!("{hint}known names: {}", known.join(", "));
+        self.report(&format!("there is no {kind} \"{name}\""), &help, span);
         false
     }
 
@@ -103,8 +102,7 @@ impl NameCheck<'_> {
     }
 
     fn report(&mut self, message: &str, help: &str, span: Span) {
-        let problem = Problem::new(message).help(help);
-        self.problems.push(self.source.locate(problem, span, "here"));
+        self.problems.push(self.source.problem(message, help, span, "here"));
     }
 
     /// Checks two levels of an axis that are to be compared.

@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use grainwake_run::case::{Located, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source, did_you_mean};
 use toml::Value;
 
 use super::quantities::is_column;
 use super::raw::{Keys, RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
-use crate::error::did_you_mean;
 
 /// Largest number of runs of a study.
 pub(crate) const MOST_RUNS: usize = 100_000;
@@ -33,7 +32,7 @@ impl Setting {
 }
 
 /// One point of the parameter space: a base case with overrides.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Model {
     /// Names of its levels joined by "-", as in "g04-o1", or the name of a single model.
     pub name: String,
@@ -62,11 +61,9 @@ pub(crate) fn expand(
     let mut models = Vec::new();
     if !raw.axis.is_empty() {
         models.push(Model {
-            name: String::new(),
             base: base.clone().unwrap_or_default(),
             settings: common.clone(),
-            levels: BTreeMap::new(),
-            factors: BTreeMap::new(),
+            ..Model::default()
         });
         for axis in &raw.axis {
             problems.check_axis(axis, &raw.axis);
@@ -116,8 +113,7 @@ impl Problems<'_> {
         span: Option<&Range<usize>>,
         label: &str,
     ) {
-        let problem = Problem::new(message).help(help);
-        self.found.push(self.source.locate(problem, span, label));
+        self.found.push(self.source.problem(message, help, span, label));
     }
 
     /// Returns the path of a case file, and reports it if the file does not exist.
@@ -357,19 +353,20 @@ pub(crate) fn matching(
     let mut indices = BTreeSet::new();
     for text in &patterns.value {
         let pattern = glob::Pattern::new(text).map_err(|error| {
-            let problem = Problem::new(format!("\"{text}\" is not a pattern: {error}"))
-                .help("a pattern is a name with * (any text), ? (one character) and [13] (1 or 3)");
-            source.locate(problem, span, "here")
+            let message = format!("\"{text}\" is not a pattern: {error}");
+            let help = "a pattern is a name with * (any text), ? (one character) and [13] (1 or 3)";
+            source.problem(message, help, span, "here")
         })?;
         let found = (0..models.len()).filter(|i| pattern.matches(&models[*i].name));
         let found: Vec<usize> = found.collect();
         indices.extend(&found);
         if found.is_empty() {
             let hint = did_you_mean(text, models.iter().map(|m| m.name.as_str()));
-            let problem = Problem::new(format!("no model is called \"{text}\"")).help(format!(
+            let message = format!("no model is called \"{text}\"");
+            let help = format!(
                 "{hint}the name of a model consists of the names of its values, joined by -"
-            ));
-            return Err(source.locate(problem, span, "matches nothing"));
+            );
+            return Err(source.problem(message, help, span, "matches nothing"));
         }
     }
     Ok(indices.into_iter().collect())

@@ -94,6 +94,17 @@ impl Study {
         Path::new("runs").join(name)
     }
 
+    /// Returns a problem of the study file with its remedy and location.
+    pub(crate) fn problem(
+        &self,
+        message: String,
+        help: &str,
+        span: Option<&Range<usize>>,
+        label: &str,
+    ) -> Problem {
+        self.source.problem(message, help, span, label)
+    }
+
     /// Adds the location in the study file to a problem.
     pub(crate) fn locate(
         &self,
@@ -119,9 +130,9 @@ fn read_analysis(
     for file in files {
         let path = folder.join(file);
         let text = read_text(&path, SETTINGS).map_err(|error| {
-            let problem = Problem::new(format!("cannot read {}: {error}", path.display()))
-                .help("paths are relative to the study file");
-            source.locate(problem, given.span.as_ref(), "this file")
+            let message = format!("cannot read {}: {error}", path.display());
+            let help = "paths are relative to the study file";
+            source.problem(message, help, given.span.as_ref(), "this file")
         })?;
         let name = path.display().to_string();
         all.extend(Analysis::parse(&name, &text, models).map_err(StudyError::Invalid)?);
@@ -142,15 +153,16 @@ fn read_ensemble(
         positive(source, turn, parse_angle, "a turn must be a positive angle")
             .map_err(|problem| problem.help("for example turn = \"2 deg\""))
     });
+    let refuse = |message: &str, help: &str| {
+        Err(source.problem(message, help, raw.members.span.as_ref(), "here").into())
+    };
     if !(1..=1000).contains(&raw.members.value) {
-        let problem = Problem::new("an ensemble has 1 to 1000 members")
-            .help("members includes the undisturbed run");
-        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+        let help = "members includes the undisturbed run";
+        return refuse("an ensemble has 1 to 1000 members", help);
     }
     if offset.is_none() && turn.is_none() && !raw.cell_shift {
-        let problem = Problem::new("all members of the ensemble would start alike")
-            .help("give offset, turn or cell_shift, for example offset = \"0.02 mm\"");
-        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+        let help = "give offset, turn or cell_shift, for example offset = \"0.02 mm\"";
+        return refuse("all members of the ensemble would start alike", help);
     }
     let models = match &raw.models {
         None => (0..models.len()).collect(),
@@ -159,9 +171,8 @@ fn read_ensemble(
     let runs = models.len().saturating_mul(raw.members.value);
     if runs > expand::MOST_RUNS {
         let most = expand::MOST_RUNS;
-        let problem = Problem::new(format!("the ensemble has {runs} runs"))
-            .help(format!("a study has at most {most} runs: take fewer members or models"));
-        return Err(source.locate(problem, raw.members.span.as_ref(), "here").into());
+        let help = format!("a study has at most {most} runs: take fewer members or models");
+        return refuse(&format!("the ensemble has {runs} runs"), &help);
     }
     Ok(Ensemble {
         members: raw.members.value,

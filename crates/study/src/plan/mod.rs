@@ -20,7 +20,7 @@ use grainwake_run::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
 use self::claims::Analysis;
-use crate::error::{At, StudyError, write_json};
+use crate::error::{At, StudyError, read_json, write_json};
 
 pub(crate) use resolve::end_condition;
 
@@ -48,7 +48,7 @@ const WRITTEN: [&str; 9] = [
 ];
 
 /// One run of a study. The JSON names are stable.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Name of the run and of its folder: the model, and "-m1", "-m2" ... for ensemble members.
     pub name: String,
@@ -134,6 +134,13 @@ pub struct Plan {
 const COMMIT_DIGITS: usize = 12;
 
 impl Plan {
+    /// Returns the plan of this program with these runs.
+    fn new(study: PathBuf, title: String, analysis: Analysis, runs: Vec<Run>) -> Plan {
+        let Provenance { version, commit, .. } = Provenance::new("");
+        let accepted = Vec::new();
+        Plan { grainwake_study: 1, study, title, version, commit, accepted, analysis, runs }
+    }
+
     /// Returns the plan with commits of other programs whose finished runs count.
     ///
     /// # Errors
@@ -209,9 +216,7 @@ impl Plan {
         if !file.exists() && Plan::exists_in(folder) {
             return Err(StudyError::Damaged { file, what: "the file is missing".into() });
         }
-        let text = std::fs::read(&file).at("read", &file)?;
-        serde_json::from_slice(&text)
-            .map_err(|error| StudyError::Damaged { file, what: error.to_string() })
+        read_json(&file)
     }
 
     /// Writes the plan into a study folder.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
-use grainwake_run::case::{Case, Problem};
+use grainwake_run::case::Case;
 
 use super::expand::Model;
 use super::file::{Ensemble, Study};
@@ -24,8 +24,7 @@ pub(crate) fn member_overrides(
     let grains = &case.setup.grains;
     let index = ensemble.grain.unwrap_or(grains.len().saturating_sub(1));
     let refuse = |message: String, help: &str| {
-        let problem = Problem::new(message).help(help);
-        Err(study.locate(problem, ensemble.span.as_ref(), "this ensemble").into())
+        Err(study.problem(message, help, ensemble.span.as_ref(), "this ensemble").into())
     };
     let Some(grain) = grains.get(index) else {
         let (name, count) = (&model.name, grains.len());

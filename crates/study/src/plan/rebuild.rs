@@ -43,18 +43,9 @@ impl Plan {
         if runs.is_empty() {
             return Err(damage);
         }
-        let program = Provenance::new("");
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
-        let plan = Plan {
-            grainwake_study: 1,
-            study: PathBuf::new(),
-            title: format!("Study {name}"),
-            version: program.version,
-            commit: program.commit,
-            accepted: Vec::new(),
-            analysis: Analysis::default(),
-            runs,
-        };
+        let title = format!("Study {name}");
+        let plan = Plan::new(PathBuf::new(), title, Analysis::default(), runs);
         let again = match command_of(&plan, folder) {
             Some(command) => format!("`{command}`"),
             None => "`grainwake study`".to_owned(),
@@ -64,9 +55,7 @@ impl Plan {
         );
         Ok((plan, Some(note)))
     }
-}
 
-impl Plan {
     /// Returns a note if the folder has a damaged plan, which this plan replaces.
     pub fn damage_in(&self, folder: &Path) -> Option<String> {
         match Plan::read(folder) {
@@ -102,22 +91,8 @@ fn runs_in(folder: &Path) -> Result<Vec<Run>, StudyError> {
     }
     for entry in table {
         let Entry { name, model, member, levels, factors, id } = entry;
-        let run = runs.entry(name.clone()).or_insert_with(|| Run {
-            name,
-            model: String::new(),
-            member: 0,
-            levels: BTreeMap::new(),
-            factors: BTreeMap::new(),
-            base: PathBuf::new(),
-            set: Vec::new(),
-            id,
-            accepted_ids: Vec::new(),
-            case_sha256: String::new(),
-            ending: String::new(),
-            end_s: 0.0,
-            memory_bytes: 0,
-            wall_s: 0.0,
-        });
+        let run = runs.entry(name.clone());
+        let run = run.or_insert_with(|| Run { name, id, ..Run::default() });
         (run.model, run.member, run.levels) = (model, member, levels);
         run.factors.extend(factors);
     }

@@ -29,17 +29,8 @@ impl Plan {
             runs.extend(found?);
         }
         check_names(study, &runs)?;
-        let program = Provenance::new("");
-        Ok(Plan {
-            grainwake_study: 1,
-            study: std::path::absolute(&study.path).unwrap_or_else(|_| study.path.clone()),
-            title: study.title.clone(),
-            version: program.version,
-            commit: program.commit,
-            accepted: Vec::new(),
-            analysis: study.analysis.clone(),
-            runs,
-        })
+        let file = std::path::absolute(&study.path).unwrap_or_else(|_| study.path.clone());
+        Ok(Plan::new(file, study.title.clone(), study.analysis.clone(), runs))
     }
 }
 
@@ -54,7 +45,7 @@ fn check_names(study: &Study, runs: &[Run]) -> Result<(), StudyError> {
             });
             let message = format!("{first} and {second} are both called \"{}\"", run.name);
             let help = "members are called MODEL-m1, MODEL-m2 ...: choose another name";
-            return Err(study.locate(Problem::new(message).help(help), None, "").into());
+            return Err(study.problem(message, help, None, "").into());
         }
     }
     Ok(())
@@ -105,19 +96,17 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
     Run {
         name: name.into(),
         model: name.into(),
-        member: 0,
-        levels: BTreeMap::new(),
         factors: shape_factors(case),
         base: base.into(),
         set,
         id,
-        accepted_ids: Vec::new(),
         case_sha256: case.digest.clone(),
         ending,
         end_s: case.plan.end,
         memory_bytes: estimate.memory_bytes,
         // JSON has no infinity.
         wall_s: estimate.wall_s.min(f64::MAX),
+        ..Run::default()
     }
 }
 
@@ -170,8 +159,7 @@ fn locate_in_ensemble(
     let moved = problems.into_iter().map(|problem| {
         let message = format!("member {member} of \"{}\": {}", model.name, problem.message);
         let help = "the ensemble changes the start of a grain: reduce offset, turn or cell_shift";
-        let problem = Problem::new(message).help(help);
-        study.locate(problem, ensemble.span.as_ref(), "this ensemble")
+        study.problem(message, help, ensemble.span.as_ref(), "this ensemble")
     });
     StudyError::Invalid(moved.collect())
 }

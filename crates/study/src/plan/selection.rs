@@ -1,9 +1,8 @@
 //! Selection of runs: `--only`.
 
-use grainwake_run::case::Problem;
+use grainwake_run::case::{Problem, did_you_mean};
 
 use super::Run;
-use crate::error::did_you_mean;
 
 /// Selection of runs of a study.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -59,13 +59,7 @@ pub enum StateKind {
 
 impl fmt::Display for StateKind {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.pad(match self {
-            StateKind::Missing => "missing",
-            StateKind::Unfinished => "unfinished",
-            StateKind::Finished => "finished",
-            StateKind::Failed => "failed",
-            StateKind::Stale => "stale",
-        })
+        self.serialize(f)
     }
 }
 

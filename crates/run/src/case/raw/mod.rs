@@ -23,7 +23,7 @@ pub use packing::{Arrangement, Bounds, PackingOrientation, RawPacking};
 pub use physics::{RawContact, RawCoupling, RawFluid};
 pub use plan::{RawOutput, RawPlane, RawRun, RawStop, RawTime};
 pub use poses::RawPoses;
-pub use probe::{RawLine, RawProbe, RawProbePlane};
+pub use probe::{RawLine, RawProbe};
 pub use scales::{RawScales, ScalePreset, ScaleTable};
 
 use glam::DVec3;

@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use crate::case::error::Problem;
 use crate::case::located::{Located, Span};
-use crate::case::quantity::{Kind, Quantity};
+use crate::case::quantity::{Kind, Length, Quantity};
 use crate::case::source::Source;
-use crate::number_format::{number, quantity};
+use crate::number_format::{AXES, length, number, quantity};
+use grainwake_solver::grid::Mesh;
 
 /// Collector of problems; a case without problems is valid.
 pub(super) struct Checker<'a> {
@@ -22,9 +23,18 @@ impl<'a> Checker<'a> {
 
     /// Reports a problem of the value at `span`; its key follows from the position.
     pub fn fail(&mut self, span: &Span, message: impl Into<String>, help: impl Into<String>) {
-        let problem = Problem::new(message).help(help);
-        let located = self.source.locate(problem, span.as_ref(), "here");
-        self.problems.push(located);
+        self.problems.push(self.source.problem(message, help, span.as_ref(), "here"));
+    }
+
+    /// Reports a problem like [`Checker::fail`]; there is no value.
+    pub fn refuse<T>(
+        &mut self,
+        span: &Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Option<T> {
+        self.fail(span, message, help);
+        None
     }
 
     /// Reports a problem of `key`, which is not written in the file.
@@ -56,8 +66,7 @@ impl<'a> Checker<'a> {
         let found = quantity(value.si, K::SI);
         let message = format!("{name} must be greater than zero, found {found}");
         let help = format!("give a positive `{}`", self.key(&value.span));
-        self.fail(&value.span, message, help);
-        None
+        self.refuse(&value.span, message, help)
     }
 
     /// Returns the value if it lies in `low..=high`.
@@ -77,19 +86,42 @@ impl<'a> Checker<'a> {
         };
         let message = format!("found {}, which is out of range", quantity(value.si, K::SI));
         let help = format!("`{}` must be {range}", self.key(&value.span));
-        self.fail(&value.span, message, help);
-        None
+        self.refuse(&value.span, message, help)
     }
 
     /// Returns the value if it is zero or more.
     pub fn not_negative<K: Kind>(&mut self, value: &Located<Quantity<K>>) -> Option<f64> {
         self.within(value, 0.0, f64::INFINITY)
     }
+
+    /// Returns the number of the axis of this name.
+    pub fn axis(&mut self, name: &Located<String>) -> Option<usize> {
+        let axis = AXES.iter().position(|axis| *axis == name.value);
+        axis.or_else(|| {
+            let message = format!("found \"{}\"", name.value);
+            self.refuse(&name.span, message, "accepted: \"x\", \"y\", \"z\"")
+        })
+    }
+
+    /// Returns a coordinate [m] of the box along an axis, like [`into_box`].
+    pub fn coordinate(
+        &mut self,
+        at: &Located<Quantity<Length>>,
+        axis: usize,
+        mesh: &Mesh,
+    ) -> Option<f64> {
+        let (lower, upper) = (mesh.origin[axis], mesh.upper()[axis]);
+        into_box(at.si, lower, upper).or_else(|| {
+            let message = format!("{} lies outside the box", length(at.si));
+            let help = format!("between {} and {}", length(lower), length(upper));
+            self.refuse(&at.span, message, help)
+        })
+    }
 }
 
 /// Returns a coordinate [m] of the box, at the side if it lies beyond it by rounding only; none
 /// outside the box.
-pub(super) fn into_box(at: f64, lower: f64, upper: f64) -> Option<f64> {
+fn into_box(at: f64, lower: f64, upper: f64) -> Option<f64> {
     let rounding = 1e-9 * (upper - lower);
     (lower - rounding..=upper + rounding).contains(&at).then(|| at.clamp(lower, upper))
 }

@@ -28,21 +28,18 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
     if let Some(size) = raw.size.as_ref().filter(|s| !positive(s.si)) {
         let found = vector(size.si, "m");
         let message = format!("the edges of the box must be longer than zero, found {found}");
-        check.fail(&size.span, message, "give three positive lengths");
-        return None;
+        return check.refuse(&size.span, message, "give three positive lengths");
     }
     if let Some(cell) = raw.cell_size.as_ref().filter(|c| !positive(c.0)) {
         let message = "the cell size must be greater than zero";
         let help = "give a positive length such as \"0.25 mm\"";
-        check.fail(&cell.span, message, help);
-        return None;
+        return check.refuse(&cell.span, message, help);
     }
     let possible = |cells: &[usize; 3]| cells.iter().all(|n| (1..=MOST_CELLS).contains(n));
     if let Some(cells) = raw.cells.as_ref().filter(|cells| !possible(cells)) {
         let message = format!("found {:?} cells", cells.value);
         let help = format!("each axis needs 1 to {MOST_CELLS} cells");
-        check.fail(&cells.span, message, help);
-        return None;
+        return check.refuse(&cells.span, message, help);
     }
     let as_vector = |cells: [usize; 3]| DVec3::from_array(cells.map(|n| n as f64));
     let (cells, spacing) = match (&raw.size, &raw.cells, &raw.cell_size) {
@@ -52,8 +49,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
             if let Some(size) = size.as_ref().filter(|size| differs(size.si)) {
                 let (size, extent) = (vector(size.si, "m"), vector(extent, "m"));
                 let message = format!("size {size} is not cells times cell_size, {extent}");
-                check.fail(&cells.span, message, "give two of size, cells and cell_size");
-                return None;
+                return check.refuse(&cells.span, message, "give two of size, cells and cell_size");
             }
             (cells.value, cell.0)
         }
@@ -71,8 +67,7 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         let cell_size = raw.cell_size.as_ref().map(|cell| &cell.span);
         let span = cell_size.or(raw.cells.as_ref().map(|cells| &cells.span));
         let message = format!("{cells:?} cells are more than any machine holds");
-        check.fail(span.unwrap_or(&None), message, COARSER);
-        return None;
+        return check.refuse(span.unwrap_or(&None), message, COARSER);
     }
     let origin = raw.origin.si;
     let mesh = Mesh { cells, spacing, origin };
@@ -94,8 +89,7 @@ fn divide(
         let ratio = edge / h;
         if ratio > MOST_CELLS as f64 {
             let message = format!("{:.1} million cells along {name}", 1e-6 * ratio);
-            check.fail(&cell.span, message, COARSER);
-            return None;
+            return check.refuse(&cell.span, message, COARSER);
         }
         if ratio < 1.0 - 1e-6 {
             let message = format!(
@@ -107,8 +101,7 @@ fn divide(
                 "a number without a unit is in metres; write a string with a unit, for example \"{}\"",
                 length(1e-3 * h)
             );
-            check.fail(&cell.span, message, help);
-            return None;
+            return check.refuse(&cell.span, message, help);
         }
         let whole = ratio.round().max(1.0);
         if (ratio - whole).abs() > 1e-6 * whole {
@@ -126,8 +119,7 @@ fn divide(
                 length(above * h),
                 length(edge / whole)
             );
-            check.fail(&cell.span, message, help);
-            return None;
+            return check.refuse(&cell.span, message, help);
         }
         cells[axis] = whole as usize;
     }

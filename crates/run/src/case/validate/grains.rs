@@ -132,15 +132,13 @@ impl<'a> Grains<'a> {
             let help = format!(
                 "{alternative} [x, y, z], or add gap_above = {{ grain = 0, gap = \"3 mm\" }}"
             );
-            check.fail(span, message, help);
-            return None;
+            return check.refuse(span, message, help);
         };
         let below = above.grain.value;
         if below >= index {
             let message = format!("grain {below} does not stand before grain {index}");
             let help = "name a grain that stands earlier in the file; they count from 0";
-            check.fail(&above.grain.span, message, help);
-            return None;
+            return check.refuse(&above.grain.span, message, help);
         }
         // A missing grain has been reported.
         let below = self.built[below].as_ref()?;
@@ -152,8 +150,7 @@ impl<'a> Grains<'a> {
                 let message = "three components, but gap_above sets the height";
                 let (a, b) = (AXES[h0], AXES[h1]);
                 let help = format!("give only [{a}, {b}], or leave out gap_above");
-                check.fail(&given.span, message, help);
-                return None;
+                return check.refuse(&given.span, message, help);
             };
             (position[h0], position[h1]) = (first, second);
         }
@@ -239,14 +236,12 @@ pub(super) fn shape(
             library.closed_form(shape, nodes).map_err(refused).ok()?
         }
         (Some(_), Some(shape)) => {
-            check.fail(&shape.span, "both file and shape are given", "keep one of them");
-            return None;
+            return check.refuse(&shape.span, "both file and shape are given", "keep one of them");
         }
         (None, None) => {
             let help =
                 "add file = \"x.grain\" or shape = { kind = \"sphere\", diameter = \"2 mm\" }";
-            check.fail(&raw.span, "the grain has no shape", help);
-            return None;
+            return check.refuse(&raw.span, "the grain has no shape", help);
         }
     };
     let Some(diameter) = &raw.equivalent_diameter else {

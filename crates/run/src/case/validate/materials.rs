@@ -1,13 +1,10 @@
 //! Materials of grains and walls.
 
 use super::check::Checker;
-use crate::case::located::Located;
+use crate::case::located::{Located, Span};
 use crate::case::quantity::{ElasticModulus, Number, Quantity};
 use crate::case::raw::{RawContact, RawGrain};
 use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, Material};
-
-type Modulus = Option<Located<Quantity<ElasticModulus>>>;
-type Ratio = Option<Located<Quantity<Number>>>;
 
 /// Sets the material of each grain and returns that of the walls; `None` after a problem.
 ///
@@ -82,25 +79,25 @@ fn refuse_unused(check: &mut Checker, contact: &RawContact, raw: &[Located<RawGr
         ContactLawKind::Linear => ("linear", "hertz-mindlin"),
         ContactLawKind::HertzMindlin => ("hertz-mindlin", "linear"),
     };
-    let modulus = |value: &Modulus| value.as_ref().map(|value| value.span.clone());
-    let number = |value: &Ratio| value.as_ref().map(|value| value.span.clone());
+    fn span<T>(value: &Option<Located<T>>) -> Option<Span> {
+        value.as_ref().map(|value| value.span.clone())
+    }
     let unused = match contact.law.value {
         ContactLawKind::HertzMindlin => vec![
-            contact.stiffness.as_ref().map(|value| value.span.clone()),
-            number(&contact.maximum_overlap),
-            number(&contact.tangential_ratio),
-            number(&contact.tangential_damping),
+            span(&contact.stiffness),
+            span(&contact.maximum_overlap),
+            span(&contact.tangential_ratio),
+            span(&contact.tangential_damping),
         ],
         ContactLawKind::Linear => {
             let of_contact = [
-                modulus(&contact.youngs_modulus),
-                number(&contact.poisson_ratio),
-                modulus(&contact.wall_youngs_modulus),
-                number(&contact.wall_poisson_ratio),
+                span(&contact.youngs_modulus),
+                span(&contact.poisson_ratio),
+                span(&contact.wall_youngs_modulus),
+                span(&contact.wall_poisson_ratio),
             ];
             let of_grain = |grain: &Located<RawGrain>| {
-                let (ratio, restitution) = (&grain.poisson_ratio, &grain.restitution);
-                [modulus(&grain.youngs_modulus), number(ratio), number(restitution)]
+                [span(&grain.youngs_modulus), span(&grain.poisson_ratio), span(&grain.restitution)]
             };
             of_contact.into_iter().chain(raw.iter().flat_map(of_grain)).collect()
         }

@@ -28,13 +28,11 @@ pub(super) fn packing(
     let count = raw.count.value;
     if raw.files.is_empty() && raw.shapes.is_empty() || count == 0 {
         let help = "give a count and files = [...] or shapes = [...]";
-        check.fail(&raw.span, "there is nothing to pack", help);
-        return None;
+        return check.refuse(&raw.span, "there is nothing to pack", help);
     }
     if count > MOST_GRAINS {
         let message = format!("{count} grains are too many");
-        check.fail(&raw.count.span, message, format!("at most {MOST_GRAINS} grains"));
-        return None;
+        return check.refuse(&raw.count.span, message, format!("at most {MOST_GRAINS} grains"));
     }
     let density = check.positive(&raw.density, "the density of a grain");
     let jitter = check.within(&raw.jitter, 0.0, 1.0);
@@ -55,8 +53,7 @@ pub(super) fn packing(
     let Some((lower, upper)) = corners else {
         let (from, to) = (vector(enclosure.lower, "m"), vector(enclosure.upper, "m"));
         let message = "the region is empty or reaches out of the box";
-        check.fail(region_span, message, format!("the box goes from {from} to {to}"));
-        return None;
+        return check.refuse(region_span, message, format!("the box goes from {from} to {to}"));
     };
     let sphere = |centre, radius| Sphere { centre, radius };
     let taken: Vec<Sphere> = (grains.built.iter().flatten())
@@ -81,8 +78,7 @@ pub(super) fn packing(
     if !region.clear(&spheres) {
         let message = "the packing runs into grains that already stand there";
         let help = "choose a region that is free, or arrangement = \"random\"";
-        check.fail(region_span, message, help);
-        return None;
+        return check.refuse(region_span, message, help);
     }
     for (grain, centre) in packed.iter_mut().zip(centres) {
         grain.position = Some(Position(centre.to_array().to_vec()).into());
@@ -103,8 +99,7 @@ fn members(
     });
     if let Some((_, _, span)) = diameters.filter(|(from, to, _)| !(*from > 0.0 && to >= from)) {
         let message = "the range of diameters is empty or not positive";
-        check.fail(span, message, "write { from = \"1 mm\", to = \"2 mm\" }");
-        return None;
+        return check.refuse(span, message, "write { from = \"1 mm\", to = \"2 mm\" }");
     }
     let files = raw.files.len();
     let mut packed = Vec::with_capacity(raw.count.value);

@@ -56,13 +56,11 @@ pub(super) fn fluid(
         (None, Some(nu)) => check.positive(nu, "the viscosity"),
         (Some(mu), Some(_)) => {
             let message = "both viscosity and kinematic_viscosity are given";
-            check.fail(&mu.span, message, "keep one of them");
-            None
+            check.refuse(&mu.span, message, "keep one of them")
         }
         (None, None) => {
             let help = "add viscosity = \"1 mPa s\" or kinematic_viscosity = \"1 cSt\"";
-            check.fail(&raw.span, "the viscosity is missing", help);
-            None
+            check.refuse(&raw.span, "the viscosity is missing", help)
         }
     };
     let fluid = &mut raw.value;
@@ -161,8 +159,7 @@ pub(super) fn contact(
     let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
         (Some(k), Some(_)) => {
             let message = "both stiffness and maximum_overlap are given";
-            check.fail(&k.span, message, "keep one of them");
-            None
+            check.refuse(&k.span, message, "keep one of them")
         }
         (Some(k), None) => check.positive(k, "the stiffness"),
         (None, Some(overlap)) => check.within(overlap, 1e-6, 0.2).map(for_overlap),

@@ -1,13 +1,13 @@
 //! `[time]`, `[output]` and `[run]` -> step rule and run plan.
 
-use super::check::{Checker, into_box};
+use super::check::Checker;
 use super::probes::probes;
 use super::scales::scales;
 use crate::case::located::Located;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawProbe, RawRun, RawStop, RawTime};
 use crate::case::settling::{default_max_step, settled_time_step};
-use crate::number_format::{AXES, length, quantity};
+use crate::number_format::quantity;
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::grid::Mesh;
@@ -39,8 +39,7 @@ pub(super) fn step(
         ];
         if let Some((name, span)) = limits.into_iter().find_map(|(n, span)| Some((n, span?))) {
             let help = format!("leave out `step` or `{name}`");
-            check.fail(span, "a fixed step has no limits", help);
-            return None;
+            return check.refuse(span, "a fixed step has no limits", help);
         }
         return Some(StepRule::Fixed(fixed));
     }
@@ -178,23 +177,9 @@ fn plane(
     grains: usize,
     mesh: &Mesh,
 ) -> Option<Plane> {
-    let normal = &raw.normal;
-    let Some(axis) = AXES.iter().position(|name| *name == normal.value) else {
-        let message = format!("found \"{}\"", normal.value);
-        check.fail(&normal.span, message, "accepted: \"x\", \"y\", \"z\"");
-        return None;
-    };
+    let axis = check.axis(&raw.normal)?;
     let position = match (&raw.at, &raw.grain) {
-        (Some(at), None) => {
-            let (lower, upper) = (mesh.origin[axis], mesh.upper()[axis]);
-            let found = into_box(at.si, lower, upper);
-            if found.is_none() {
-                let message = format!("{} lies outside the box", length(at.si));
-                let help = format!("between {} and {}", length(lower), length(upper));
-                check.fail(&at.span, message, help);
-            }
-            PlanePosition::At(found.unwrap_or(at.si))
-        }
+        (Some(at), None) => PlanePosition::At(check.coordinate(at, axis, mesh)?),
         (None, Some(grain)) => {
             if grain.value >= grains {
                 let message = format!("there is no grain {}", grain.value);
@@ -205,8 +190,7 @@ fn plane(
         }
         _ => {
             let help = "for example { normal = \"y\", grain = 0 }";
-            check.fail(&raw.span, "give either `at` or `grain`", help);
-            return None;
+            return check.refuse(&raw.span, "give either `at` or `grain`", help);
         }
     };
     Some(Plane { axis, position })

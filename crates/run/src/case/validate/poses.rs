@@ -32,19 +32,16 @@ pub(super) fn poses(
         (Some(run), None) => of_run(check, grains, raw, run)?,
         (None, Some(file)) => of_file(check, grains, raw, file)?,
         (Some(_), Some(file)) => {
-            check.fail(&file.span, "both run and file are given", "keep one of them");
-            return None;
+            return check.refuse(&file.span, "both run and file are given", "keep one of them");
         }
         (None, None) => {
             let help = "add run = \"../../runs/heap\" or file = \"heap.csv\"";
-            check.fail(&raw.span, "there is no table of poses", help);
-            return None;
+            return check.refuse(&raw.span, "there is no table of poses", help);
         }
     };
     if table.poses.len() > MOST_GRAINS {
         let message = format!("{} grains are too many", table.poses.len());
-        check.fail(&raw.span, message, format!("at most {MOST_GRAINS} grains"));
-        return None;
+        return check.refuse(&raw.span, message, format!("at most {MOST_GRAINS} grains"));
     }
     let mut placed = Vec::with_capacity(table.poses.len());
     let mut densities = BTreeSet::new();
@@ -102,8 +99,7 @@ fn of_run<'a>(
             "leave out `{key}`, or take the table with file = \"{}/grains.csv\"",
             run.value
         );
-        check.fail(&run.span, message, help);
-        return None;
+        return check.refuse(&run.span, message, help);
     }
     let folder = grains.library.path(&run.value);
     let path = folder.join(RESOLVED);
@@ -115,8 +111,7 @@ fn of_run<'a>(
                 std::io::ErrorKind::NotFound => format!("there is no run in {}", folder.display()),
                 _ => format!("cannot read {}: {error}", path.display()),
             };
-            check.fail(&run.span, message, help);
-            return None;
+            return check.refuse(&run.span, message, help);
         }
     };
     let parsed = Source::parse::<RawCase>(&path.display().to_string(), &text, &[]);
@@ -124,8 +119,7 @@ fn of_run<'a>(
         Ok((_, case)) => case,
         Err(problem) => {
             let message = format!("the case of the run cannot be read: {problem}");
-            check.fail(&run.span, message, help);
-            return None;
+            return check.refuse(&run.span, message, help);
         }
     };
     let table = read_table(check, raw, &folder.join(grains_table::FILE), &run.span)?;
@@ -137,16 +131,14 @@ fn of_run<'a>(
             table.poses.len(),
             table.rows_before.unwrap_or(0)
         );
-        check.fail(&run.span, message, "continue the run, or give an earlier `time`");
-        return None;
+        return check.refuse(&run.span, message, "continue the run, or give an earlier `time`");
     }
     let grain_of = move |check: &mut Checker, pose: &Pose| {
         let Some(grain) = case.grain.get(pose.grain) else {
             let count = case.grain.len();
             let message =
                 format!("{} has grain {}, but its run has {count}", grains_table::FILE, pose.grain);
-            check.fail(&run.span, message, "the folder is damaged: run its case again");
-            return None;
+            return check.refuse(&run.span, message, "the folder is damaged: run its case again");
         };
         let mut grain = moved(&grain.value, &run.span);
         if let Some(file) = &mut grain.file {
@@ -170,8 +162,7 @@ fn of_file<'a>(
 ) -> Option<(Poses, GrainOf<'a>)> {
     if raw.files.is_empty() && raw.shapes.is_empty() {
         let help = "add files = [...] or shapes = [...], or name the run with run = ...";
-        check.fail(&raw.span, "the grains of the table have no shape", help);
-        return None;
+        return check.refuse(&raw.span, "the grains of the table have no shape", help);
     }
     let table = read_table(check, raw, &grains.library.path(&file.value), &file.span)?;
     let grain_of = move |check: &mut Checker, pose: &Pose| {
@@ -181,8 +172,7 @@ fn of_file<'a>(
         let density = pose.density.map(|value| Located::at(Quantity::new(value), of_file()));
         let Some(density) = density.or_else(|| raw.density.clone()) else {
             let help = "add density = ..., or a column density to the table";
-            check.fail(&raw.span, "the grains of the table have no density", help);
-            return None;
+            return check.refuse(&raw.span, "the grains of the table have no density", help);
         };
         let diameter = pose.equivalent_diameter;
         let diameter = diameter.map(|value| Located::at(Quantity::new(value), of_file()));
@@ -209,8 +199,7 @@ fn read_table(check: &mut Checker, raw: &RawPoses, path: &Path, span: &Span) -> 
             let span = raw.time.as_ref().map_or(span, |time| &time.span);
             let help = "a table has the columns x, y, z and may have those of grains.csv; paths \
                         are relative to the case file";
-            check.fail(span, error.to_string(), help);
-            None
+            check.refuse(span, error.to_string(), help)
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::check::{Checker, into_box, point_into_box};
+use super::check::{Checker, point_into_box};
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Length, Triple};
-use crate::case::raw::{RawLine, RawProbe, RawProbePlane};
-use crate::number_format::{AXES, length, vector};
+use crate::case::raw::{RawLine, RawProbe};
+use crate::number_format::vector;
 use crate::{Probe, ProbePlace};
 use grainwake_solver::grid::Mesh;
 
@@ -67,11 +67,13 @@ fn place(check: &mut Checker, raw: &Located<RawProbe>, mesh: &Mesh) -> Option<Pr
             points.into_iter().collect::<Option<_>>().map(ProbePlace::Points)
         }
         (None, None, Some(line), None) => points_of_line(check, line, mesh).map(ProbePlace::Points),
-        (None, None, None, Some(plane)) => plane_across(check, plane, mesh),
+        (None, None, None, Some(plane)) => {
+            let axis = check.axis(&plane.normal)?;
+            Some(ProbePlace::Plane { axis, at: check.coordinate(&plane.at, axis, mesh)? })
+        }
         _ => {
             let help = "for example point = [\"5 mm\", \"5 mm\", \"20 mm\"] or plane = { normal = \"z\", at = \"20 mm\" }";
-            check.fail(&raw.span, "give one of `point`, `points`, `line` and `plane`", help);
-            None
+            check.refuse(&raw.span, "give one of `point`, `points`, `line` and `plane`", help)
         }
     }
 }
@@ -79,13 +81,11 @@ fn place(check: &mut Checker, raw: &Located<RawProbe>, mesh: &Mesh) -> Option<Pr
 /// Returns a point of the box.
 fn inside(check: &mut Checker, point: &Located<Triple<Length>>, mesh: &Mesh) -> Option<DVec3> {
     let (lower, upper) = (mesh.origin, mesh.upper());
-    let found = point_into_box(point.si, lower, upper);
-    if found.is_none() {
+    point_into_box(point.si, lower, upper).or_else(|| {
         let message = format!("{} lies outside the box", vector(point.si, "m"));
         let help = format!("between {} and {}", vector(lower, "m"), vector(upper, "m"));
-        check.fail(&point.span, message, help);
-    }
-    found
+        check.refuse(&point.span, message, help)
+    })
 }
 
 /// Returns whether a probe may have so many points.
@@ -107,25 +107,4 @@ fn points_of_line(check: &mut Checker, line: &Located<RawLine>, mesh: &Mesh) -> 
     // The last point is exact.
     let part = |n: usize| n as f64 / (count - 1) as f64;
     Some((0..count).map(|n| from * (1.0 - part(n)) + to * part(n)).collect())
-}
-
-fn plane_across(
-    check: &mut Checker,
-    raw: &Located<RawProbePlane>,
-    mesh: &Mesh,
-) -> Option<ProbePlace> {
-    let normal = &raw.normal;
-    let Some(axis) = AXES.iter().position(|name| *name == normal.value) else {
-        let message = format!("found \"{}\"", normal.value);
-        check.fail(&normal.span, message, "accepted: \"x\", \"y\", \"z\"");
-        return None;
-    };
-    let (at, lower, upper) = (raw.at.si, mesh.origin[axis], mesh.upper()[axis]);
-    let found = into_box(at, lower, upper);
-    if found.is_none() {
-        let message = format!("{} lies outside the box", length(at));
-        let help = format!("between {} and {}", length(lower), length(upper));
-        check.fail(&raw.at.span, message, help);
-    }
-    Some(ProbePlace::Plane { axis, at: found? })
 }

@@ -94,8 +94,7 @@ fn given(check: &mut Checker, table: &ScaleTable, setup: &Setup) -> Option<Scale
         (None, Some(velocity)) => (length / velocity?, velocity?),
         (None, None) => {
             let message = "a length alone gives no time and no velocity";
-            check.fail(&table.length.span, message, "add `time` or `velocity`");
-            return None;
+            return check.refuse(&table.length.span, message, "add `time` or `velocity`");
         }
     };
     Some(Scales {
