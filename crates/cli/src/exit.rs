@@ -1,5 +1,6 @@
 //! Exit codes and error messages.
 
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use grainwake_run::case::{CaseError, Problem};
@@ -42,6 +43,10 @@ impl Exit {
     /// Creates a failure with one message and its remedy.
     pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
         Exit { code, problems: vec![Problem::new(message).help(help)] }
+    }
+    /// Creates a failure because of invalid input, with its remedy.
+    pub fn refused(message: impl Into<String>, help: impl Into<String>) -> Exit {
+        Exit::with_help(BAD_INPUT, message, help)
     }
     /// Creates a failure with one message and its remedy if there is one.
     pub fn with_hint(code: u8, message: impl ToString, help: Option<impl Into<String>>) -> Exit {
@@ -86,13 +91,11 @@ impl From<CaseError> for Exit {
         match error {
             CaseError::Unreadable { ref source, .. } => {
                 let (code, help) = match source.kind() {
-                    std::io::ErrorKind::NotFound => (
+                    ErrorKind::NotFound => (
                         BAD_INPUT,
                         "give the path of a case file, for example cases/dkt-pair/quick.toml",
                     ),
-                    std::io::ErrorKind::InvalidData
-                    | std::io::ErrorKind::InvalidInput
-                    | std::io::ErrorKind::FileTooLarge => {
+                    ErrorKind::InvalidData | ErrorKind::InvalidInput | ErrorKind::FileTooLarge => {
                         (BAD_INPUT, "a case file is a TOML text in UTF-8")
                     }
                     _ => (IO, "check the file and its permissions"),
@@ -107,20 +110,18 @@ impl From<CaseError> for Exit {
 impl From<RunError> for Exit {
     fn from(error: RunError) -> Exit {
         let help = match &error {
-            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::StorageFull => {
-                Some("the disk is full: free some space, then continue with --resume")
-            }
-            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::FileTooLarge => {
-                Some(
-                    "the file exceeds the limit of this shell (ulimit -f) or of the file system: raise it, then continue with --resume",
-                )
-            }
-            RunError::Io { source, .. } if source.kind() == std::io::ErrorKind::QuotaExceeded => {
-                Some("your disk quota is used up: free some space, then continue with --resume")
-            }
-            RunError::Io { .. } => {
-                Some("check the folder and its permissions; continue a started run with --resume")
-            }
+            RunError::Io { source, .. } => Some(match source.kind() {
+                ErrorKind::StorageFull => {
+                    "the disk is full: free some space, then continue with --resume"
+                }
+                ErrorKind::FileTooLarge => {
+                    "the file exceeds the limit of this shell (ulimit -f) or of the file system: raise it, then continue with --resume"
+                }
+                ErrorKind::QuotaExceeded => {
+                    "your disk quota is used up: free some space, then continue with --resume"
+                }
+                _ => "check the folder and its permissions; continue a started run with --resume",
+            }),
             _ => None,
         };
         Exit::with_hint(exit_code(error.kind()), error, help)
@@ -131,7 +132,7 @@ impl From<ShapeError> for Exit {
     fn from(error: ShapeError) -> Exit {
         let code = match &error {
             ShapeError::Io { source, .. } => match source.kind() {
-                std::io::ErrorKind::NotFound | std::io::ErrorKind::InvalidInput => BAD_INPUT,
+                ErrorKind::NotFound | ErrorKind::InvalidInput => BAD_INPUT,
                 _ => IO,
             },
             _ => BAD_INPUT,

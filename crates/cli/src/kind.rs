@@ -1,6 +1,7 @@
 //! Distinction of case files and study files, to suggest the right command for a confused file.
 
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_run::case::{Case, CaseError, Source};
@@ -9,7 +10,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use crate::args::Overrides;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::Exit;
 
 /// Top-level keys that occur in one of the two kinds only.
 #[derive(Deserialize)]
@@ -42,12 +43,26 @@ fn kind(path: &Path) -> Option<Kind> {
     }
 }
 
+/// Returns the default folder of the results of a file: `runs/FOLDER` for one with the `usual`
+/// name, else `runs/FOLDER-FILE`; `runs/FILE` if the folder is not the `own` one of its files.
+pub fn default_folder(file: &Path, usual: &str, own: impl Fn(&Path) -> bool) -> PathBuf {
+    let absolute = std::path::absolute(file).unwrap_or_else(|_| file.into());
+    let name = |part: Option<&OsStr>| part.map(|part| part.to_string_lossy().into_owned());
+    let stem = name(absolute.file_stem()).unwrap_or_else(|| usual.into());
+    let folder = absolute.parent().filter(|folder| own(folder));
+    let name = match name(folder.and_then(Path::file_name)) {
+        Some(folder) if stem == usual => folder,
+        Some(folder) => format!("{folder}-{stem}"),
+        None => stem,
+    };
+    Path::new("runs").join(name)
+}
+
 /// Reads a case file and applies overrides.
 pub fn case(path: &Path, overrides: &Overrides) -> Result<Case, Exit> {
     Case::load(path, &overrides.list()).map_err(|error| {
         if matches!(error, CaseError::Invalid(_)) && kind(path) == Some(Kind::Study) {
-            return Exit::with_help(
-                BAD_INPUT,
+            return Exit::refused(
                 format!("{} is a study file, not a case", path.display()),
                 format!("use: grainwake study {}; --dry-run lists its runs", path.display()),
             );
@@ -60,8 +75,7 @@ pub fn case(path: &Path, overrides: &Overrides) -> Result<Case, Exit> {
 pub fn study(path: &Path) -> Result<Study, Exit> {
     Study::read(path).map_err(|error| {
         if matches!(error, StudyError::Invalid(_)) && kind(path) == Some(Kind::Case) {
-            return Exit::with_help(
-                BAD_INPUT,
+            return Exit::refused(
                 format!("{} is a case, not a study file", path.display()),
                 format!(
                     "use: grainwake run {}; a study file refers to it as its `base`",

@@ -2,6 +2,9 @@
 //! nor changes its exit code.
 
 use std::io::{ErrorKind, Write};
+use std::ops::Range;
+
+use comfy_table::{CellAlignment, Table, presets};
 
 use crate::exit::Exit;
 
@@ -30,6 +33,22 @@ pub fn columns(rows: &[(&str, String)]) -> String {
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let line = |(name, value): &(&str, String)| format!("{name:width$}  {value}");
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Returns rows of cells as a Markdown table, with the `numbers` among the columns at the right.
+pub fn markdown<'a>(
+    header: impl IntoIterator<Item = &'a str>,
+    rows: impl IntoIterator<Item = Vec<String>>,
+    numbers: Range<usize>,
+) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header(header.into_iter().map(str::to_owned).collect::<Vec<_>>());
+    table.add_rows(rows);
+    for column in table.column_iter_mut().skip(numbers.start).take(numbers.len()) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
 }
 
 /// Formats a line for [`say`].

@@ -1,22 +1,25 @@
 //! Progress of a run on standard error: a bar on a terminal, otherwise a line at intervals.
 
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use grainwake_formats::events::Event;
-use grainwake_run::{Observer, Progress};
+use grainwake_run::{Ending, Job, Observer, Options, Progress, RunError};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::tell;
+use crate::exit::Exit;
+use crate::{tell, threads};
 
 /// Interval of the lines without a terminal [s].
 const LINE_INTERVAL: f64 = 10.0;
-const TICKS: u64 = 10_000;
+/// Steps of a bar.
+pub const TICKS: u64 = 10_000;
 
 /// Progress display of a run.
-pub struct ProgressDisplay {
+struct ProgressDisplay {
     bar: Option<ProgressBar>,
     quiet: bool,
     last_line: Instant,
@@ -28,21 +31,13 @@ pub struct ProgressDisplay {
 impl ProgressDisplay {
     /// Creates a display that stops the run when `stop` is set; gaps are shown in units of
     /// `diameter` [m].
-    pub fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> ProgressDisplay {
-        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::new(TICKS);
-            if let Ok(style) =
-                ProgressStyle::with_template("{bar:30.cyan/blue} {percent:>3} % {msg}")
-            {
-                bar.set_style(style.progress_chars("━╸─"));
-            }
-            bar
-        });
+    fn new(quiet: bool, stop: Arc<AtomicBool>, diameter: Option<f64>) -> ProgressDisplay {
+        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| bar("cyan"));
         ProgressDisplay { bar, quiet, last_line: Instant::now(), stop, diameter }
     }
 
     /// Removes the bar.
-    pub fn clear(&self) {
+    fn clear(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
@@ -76,6 +71,34 @@ impl ProgressDisplay {
         }
         text
     }
+}
+
+/// Runs a job with a progress display, on the threads of the options, until its end or `stop`.
+/// The inner error is that of the run.
+pub fn run(
+    job: Job,
+    out: &Path,
+    options: &Options,
+    quiet: bool,
+    stop: Arc<AtomicBool>,
+) -> Result<Result<Ending, RunError>, Exit> {
+    let diameter = job.setup.grains.first().map(|grain| grain.shape.equivalent_diameter());
+    let mut shown = ProgressDisplay::new(quiet, stop, diameter);
+    threads::on(options.threads, || {
+        let ending = grainwake_run::run(job, out, options, &mut shown);
+        shown.clear();
+        ending
+    })
+}
+
+/// Returns a bar of [`TICKS`] steps with a percentage and a message.
+pub fn bar(colour: &str) -> ProgressBar {
+    let bar = ProgressBar::new(TICKS);
+    let template = format!("{{bar:30.{colour}/blue}} {{percent:>3}} % {{msg}}");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style.progress_chars("━╸─"));
+    }
+    bar
 }
 
 fn per_second(rate: f64) -> String {

@@ -22,8 +22,7 @@ impl From<ReportError> for Exit {
 pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     let study = Plan::exists_in(&args.run);
     if args.film && study {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             format!("{} is a study folder; a film shows one run", args.run.display()),
             format!("give a run folder, for example {}", args.run.join("runs/NAME").display()),
         ));
@@ -33,9 +32,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     }
     if study {
         let done = grainwake_study::render(&args.run)?;
-        for note in &done.notes {
-            tell!("note: {note}");
-        }
+        done.notes.iter().for_each(|note| tell!("note: {note}"));
         let (plan, _) = Plan::read_or_rebuild(&args.run)?;
         if done.png.is_empty() && plan.analysis == Analysis::default() {
             tell!("note: no figures: no run has results to draw");
@@ -48,18 +45,14 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
         ));
     }
     let done = render(&args.run)?;
-    for note in &done.notes {
-        tell!("note: {note}");
-    }
+    done.notes.iter().for_each(|note| tell!("note: {note}"));
     print(&format!("{} ({})", done.page.display(), count(done.png.len(), "figure")))
 }
 
 /// Writes the film of a run folder.
 fn film(args: &ReportArgs) -> Result<(), Exit> {
     let film = write_film(&args.run)?;
-    for note in &film.notes {
-        tell!("note: {note}");
-    }
+    film.notes.iter().for_each(|note| tell!("note: {note}"));
     let [width, height] = film.size;
     let slower = film.delay / film.interval;
     tell!(

@@ -11,7 +11,7 @@ use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
-use crate::progress::{ProgressDisplay, count};
+use crate::progress::{self, count};
 use crate::{check, expect, kind, print, signals, tell, threads};
 
 /// Runs a case.
@@ -31,13 +31,8 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         case.check_parent(&found)?;
         parent = Some(found);
     }
-    let options = Options {
-        existing,
-        command: std::env::args().collect(),
-        threads,
-        parent,
-        controlled_from: None,
-    };
+    let command = std::env::args().collect();
+    let options = Options { existing, command, threads, parent, ..Options::default() };
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
     if !args.quiet {
@@ -56,15 +51,8 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         );
         check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
-    let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
     let job = case.job_in(&out, existing)?;
-    let mut shown = ProgressDisplay::new(args.quiet, stop, diameter);
-    let ending = threads::on(threads, || {
-        let ending = grainwake_run::run(job, &out, &options, &mut shown);
-        shown.clear();
-        ending
-    })??;
-    match ending {
+    match progress::run(job, &out, &options, args.quiet, stop)?? {
         Ending::Interrupted(time) => {
             let message =
                 format!("interrupted at t = {}; a checkpoint was written", quantity(time, "s"));
@@ -134,7 +122,7 @@ fn describe(s: &Summary, wet: bool, out: &Path) -> String {
         s.end_time_s,
         s.ended_by,
         count(s.steps as usize, "step"),
-        crate::progress::clock(s.cost.wall_s)
+        progress::clock(s.cost.wall_s)
     )];
     if wet {
         lines[0] += &format!("; largest |div u| {:.1e} 1/s", s.max_divergence);
@@ -156,23 +144,10 @@ fn describe(s: &Summary, wet: bool, out: &Path) -> String {
 /// cases beside it, `runs/FILE` elsewhere, and its own folder for a resolved case.
 fn default_folder(case: &Path) -> PathBuf {
     if case.file_name().is_some_and(|name| name == RESOLVED) {
-        return match case.parent() {
-            Some(folder) if folder.as_os_str().is_empty() => PathBuf::from("."),
-            Some(folder) => folder.into(),
-            None => PathBuf::from("."),
-        };
+        let folder = case.parent().filter(|folder| !folder.as_os_str().is_empty());
+        return folder.unwrap_or(Path::new(".")).into();
     }
-    let absolute = std::path::absolute(case).unwrap_or_else(|_| case.into());
-    let name = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned());
-    let stem = name(absolute.file_stem()).unwrap_or_else(|| "case".into());
-    let folder = absolute.parent();
-    let is_case_folder = folder.is_some_and(|f| f.join("case.toml").is_file());
-    let name = match name(folder.and_then(Path::file_name)).filter(|_| is_case_folder) {
-        Some(folder) if stem == "case" => folder,
-        Some(folder) => format!("{folder}-{stem}"),
-        None => stem,
-    };
-    Path::new("runs").join(name)
+    kind::default_folder(case, "case", |folder| folder.join("case.toml").is_file())
 }
 
 #[cfg(test)]

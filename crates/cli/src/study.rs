@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use grainwake_run::FailureKind;
 use grainwake_run::number_format::size;
 use grainwake_study::{
@@ -14,6 +14,7 @@ use grainwake_study::{
 
 use crate::args::StudyArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, exit_code};
+use crate::out::markdown;
 use crate::progress::{clock, count, first_line};
 use crate::study_board::Board;
 use crate::{kind, print, signals, tell, threads};
@@ -25,7 +26,7 @@ impl From<StudyError> for Exit {
             StudyError::Case(error) => error.into(),
             StudyError::Report(error) => error.into(),
             StudyError::Occupied { .. } => {
-                Exit::with_help(BAD_INPUT, error.to_string(), "give another folder with -o")
+                Exit::refused(error.to_string(), "give another folder with -o")
             }
             StudyError::Damaged { ref file, .. } => {
                 let help = if file.file_name().is_some_and(|name| name == MANIFEST) {
@@ -34,7 +35,7 @@ impl From<StudyError> for Exit {
                     "mend or restore the file, or remove it: the runs whose folders exist are \
                      measured again, the others are repeated"
                 };
-                Exit::with_help(BAD_INPUT, error.to_string(), help)
+                Exit::refused(error.to_string(), help)
             }
             StudyError::Io { action, ref source, .. } => {
                 use std::io::ErrorKind::{
@@ -62,7 +63,8 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let plan = plan.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
     let runs = &plan.runs;
     let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let folder = args.output.clone().unwrap_or_else(|| study.default_folder());
+    let folder =
+        args.output.clone().unwrap_or_else(|| kind::default_folder(&args.study, "study", |_| true));
     let jobs = args.jobs.clamp(1, chosen.len().max(1));
     let (jobs, each) = threads::share(jobs, args.threads);
     if args.list || args.dry_run {
@@ -264,25 +266,20 @@ fn pretty(rows: &[&RunRecord]) -> Table {
         .filter(|(shown, _)| *shown)
         .flat_map(|(_, columns)| columns)
         .collect();
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    let header = ["run", "state"].into_iter().chain(columns.iter().map(|c| c.0));
-    table.set_header(header.chain(["wall"]));
-    for row in rows {
-        let mut cells = vec![row.name.clone(), row.state.to_string()];
-        cells.extend(columns.iter().map(|(_, name)| match row.measured(name) {
+    let header = ["run", "state"].into_iter().chain(columns.iter().map(|c| c.0)).chain(["wall"]);
+    let cells = rows.iter().map(|row| {
+        let measured = columns.iter().map(|(_, name)| match row.measured(name) {
             Some(v) if v.fract() == 0.0 => format!("{v:.0}"),
             Some(v) if v.abs() < 0.1 => format!("{v:.5}"),
             Some(v) => format!("{v:.3}"),
             None => "-".into(),
-        }));
-        cells.push(row.wall_s.map_or("-".into(), clock));
-        table.add_row(cells);
-    }
-    for column in 2..columns.len() + 3 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    table
+        });
+        let wall = row.wall_s.map_or("-".into(), clock);
+        [row.name.clone(), row.state.to_string()]
+            .into_iter()
+            .chain(measured)
+            .chain([wall])
+            .collect()
+    });
+    markdown(header, cells, 2..columns.len() + 3)
 }

@@ -9,14 +9,13 @@ use std::time::Instant;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_run::Progress;
 use grainwake_study::{Outcome, Run, StudyObserver};
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar};
 
-use crate::progress::{clock, first_line};
+use crate::progress::{TICKS, bar, clock, first_line};
 use crate::tell;
 
 /// Interval between lines without a terminal [s].
 const LINE_INTERVAL: f64 = 60.0;
-const TICKS: u64 = 10_000;
 
 /// Progress display of a study.
 pub struct Board<'a> {
@@ -62,8 +61,7 @@ impl<'a> Board<'a> {
         stop: Arc<AtomicBool>,
     ) -> Board<'a> {
         let bars = (!quiet && std::io::stderr().is_terminal()).then(MultiProgress::new);
-        let whole =
-            bars.as_ref().map(|bars| bars.add(bar("{bar:30.green/blue} {percent:>3} % {msg}")));
+        let whole = bars.as_ref().map(|bars| bars.add(bar("green")));
         Board {
             runs,
             total: chosen.len(),
@@ -106,14 +104,6 @@ impl<'a> Board<'a> {
     }
 }
 
-fn bar(template: &str) -> ProgressBar {
-    let bar = ProgressBar::new(TICKS);
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style.progress_chars("━╸─"));
-    }
-    bar
-}
-
 impl Inner {
     /// Returns the completed fraction of the study and the remaining wall-clock time [s], from the
     /// time that remains to be simulated and the rate so far.
@@ -140,7 +130,7 @@ impl StudyObserver for Board<'_> {
     fn started(&self, run: usize) {
         let name = &self.runs[run].name;
         let bar = self.bars.as_ref().map(|bars| {
-            let bar = bars.insert_from_back(1, bar("{bar:30.cyan/blue} {percent:>3} % {msg}"));
+            let bar = bars.insert_from_back(1, bar("cyan"));
             bar.set_message(name.clone());
             bar
         });

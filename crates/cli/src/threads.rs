@@ -1,6 +1,6 @@
 //! The thread pool of a command.
 
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::Exit;
 use crate::tell;
 
 /// Returns the number of threads; warns if it is reduced.
@@ -32,8 +32,7 @@ fn warn(text: String) {
 pub fn on<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Exit> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| {
-        Exit::with_help(
-            BAD_INPUT,
+        Exit::refused(
             format!("cannot start {threads} threads: {error}"),
             "use fewer threads (--threads N)",
         )

@@ -36,9 +36,7 @@ pub fn view(args: &ViewArgs) -> Result<(), Exit> {
     if let Some(file) = &args.save {
         may_save(file)?;
         let notes = save(&mut viewer, file)?;
-        for note in &notes {
-            tell!("note: {note}");
-        }
+        notes.iter().for_each(|note| tell!("note: {note}"));
         let bytes = std::fs::metadata(file)?.len();
         return print(&format!("{} ({})", file.display(), size(bytes)));
     }
@@ -57,7 +55,7 @@ pub fn view(args: &ViewArgs) -> Result<(), Exit> {
 fn may_save(file: &Path) -> Result<(), Exit> {
     let refused = |what: &str| {
         let message = format!("--save: {} {what}", file.display());
-        Err(Exit::with_help(BAD_INPUT, message, "name a page, such as page.html"))
+        Err(Exit::refused(message, "name a page, such as page.html"))
     };
     if file.is_dir() {
         return refused("is a folder");
@@ -84,7 +82,7 @@ fn viewer(folders: &[PathBuf]) -> Result<Viewer, Exit> {
         _ => {
             if let Some(study) = folders.iter().find(|folder| Plan::exists_in(folder)) {
                 let message = format!("{} is a study among several folders", study.display());
-                return Err(Exit::with_help(BAD_INPUT, message, "view one study at a time"));
+                return Err(Exit::refused(message, "view one study at a time"));
             }
             let source = |folder: &PathBuf| Source { name: name(folder), folder: folder.clone() };
             let mut sources: Vec<Source> = folders.iter().map(source).collect();
@@ -132,7 +130,7 @@ fn of_study(folder: &Path) -> Result<Viewer, Exit> {
     }
     if sources.is_empty() {
         let message = format!("{}: no run of the study has been started", folder.display());
-        return Err(Exit::with_help(BAD_INPUT, message, "run `grainwake study` first"));
+        return Err(Exit::refused(message, "run `grainwake study` first"));
     }
     Ok(Viewer::new(sources, Some(table))?)
 }

@@ -1,6 +1,6 @@
 //! `grain compare`.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
@@ -8,7 +8,7 @@ use serde_json::json;
 use super::may_draw;
 use crate::args::CompareArgs;
 use crate::exit::Exit;
-use crate::print;
+use crate::out::{markdown, print};
 
 /// Prints the morphology of two grains and the distance of their surfaces.
 pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
@@ -56,21 +56,12 @@ fn measures(first: &Record, second: &Record) -> Table {
             ("surface area [mm2]", Some(1e6 * r.surface_area_m2)),
         ]
     };
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["", "first", "second", "difference"]);
-    for ((name, p), (_, q)) in rows(first).into_iter().zip(rows(second)) {
-        let value = |x: Option<f64>| x.map_or("not measured".into(), |x| format!("{x:.4}"));
-        let difference = match (p, q) {
-            (Some(p), Some(q)) => format!("{:+.2} %", 100.0 * (q / p - 1.0)),
-            _ => "-".into(),
-        };
-        table.add_row([name.to_string(), value(p), value(q), difference]);
-    }
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+    let value = |x: Option<f64>| x.map_or("not measured".into(), |x| format!("{x:.4}"));
+    let cells = rows(first).into_iter().zip(rows(second)).map(|((name, p), (_, q))| {
+        let difference = p.zip(q).map(|(p, q)| format!("{:+.2} %", 100.0 * (q / p - 1.0)));
+        vec![name.to_owned(), value(p), value(q), difference.unwrap_or("-".into())]
+    });
+    markdown(["", "first", "second", "difference"], cells, 1..4)
 }
 
 fn surfaces(comparison: &Comparison, diameter: f64) -> String {

@@ -12,8 +12,7 @@ use crate::print;
 pub fn export(args: &ExportArgs) -> Result<(), Exit> {
     let ending = args.output.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let Some(format) = MeshFormat::of_ending(&ending) else {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             format!("{} does not name a mesh format", args.output.display()),
             "the output ends in .stl, .ply, .obj or .vtp",
         ));

@@ -61,8 +61,7 @@ fn refused(error: ShapeError, sphericity: f64) -> Exit {
         return error.into();
     };
     let least = (1e3 * sphericity.powi(3).max(0.2) - 1e-3).ceil() / 1e3;
-    Exit::with_help(
-        BAD_INPUT,
+    Exit::refused(
         error.to_string(),
         format!(
             "with --sphericity {sphericity} the flatness can be {least} to 1; omit --flatness for the default"

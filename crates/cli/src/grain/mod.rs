@@ -66,8 +66,7 @@ fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
     if GRAINS.contains(&diameter) {
         return Ok(());
     }
-    Err(Exit::with_help(
-        BAD_INPUT,
+    Err(Exit::refused(
         format!(
             "the grain has an equivalent diameter of {}; accepted are 1 um to 1 m",
             number_format::length(diameter)
@@ -95,8 +94,7 @@ fn may_write(path: &Path, force: bool) -> Result<(), Exit> {
         return may_create(folder_of(path));
     }
     if !force {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             format!("{} exists already", path.display()),
             "choose another name with -o, or replace it with --force",
         ));
@@ -111,8 +109,7 @@ fn not_input(output: &Path, input: &Path) -> Result<(), Exit> {
         _ => false,
     };
     if same {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             format!("{} is an input of this command", output.display()),
             "choose another name for the output",
         ));
@@ -126,13 +123,13 @@ fn may_draw(option: &str, picture: &Path, inputs: &[&Path]) -> Result<(), Exit> 
     inputs.iter().try_for_each(|input| not_input(picture, input))?;
     if picture.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         let message = format!("{option}: {} does not end in .png", picture.display());
-        return Err(Exit::with_help(BAD_INPUT, message, "name a picture, such as picture.png"));
+        return Err(Exit::refused(message, "name a picture, such as picture.png"));
     }
     let mut start = [0; 8];
     let read = std::fs::File::open(picture).and_then(|mut file| file.read_exact(&mut start));
     if picture.exists() && (read.is_err() || start != *b"\x89PNG\r\n\x1a\n") {
         let message = format!("{option}: {} exists and is not a picture", picture.display());
-        return Err(Exit::with_help(BAD_INPUT, message, "choose another name"));
+        return Err(Exit::refused(message, "choose another name"));
     }
     Ok(())
 }
@@ -143,7 +140,7 @@ fn may_create(folder: &Path) -> Result<(), Exit> {
     let help = "choose another place with -o";
     if !above.is_dir() {
         let message = format!("{} is a file, not a folder", above.display());
-        return Err(Exit::with_help(BAD_INPUT, message, help));
+        return Err(Exit::refused(message, help));
     }
     let probe = above.join(format!(".grainwake-{}", std::process::id()));
     std::fs::create_dir(&probe).and_then(|()| std::fs::remove_dir(&probe)).map_err(|error| {
@@ -169,8 +166,7 @@ fn grain_file(path: &Path) -> Result<(), Exit> {
     if path.extension().is_some_and(|e| e == "grain") {
         return Ok(());
     }
-    Err(Exit::with_help(
-        BAD_INPUT,
+    Err(Exit::refused(
         format!("{} does not end in .grain", path.display()),
         format!("use -o {}", path.with_extension("grain").display()),
     ))
@@ -188,8 +184,7 @@ fn folder(path: &Path) -> Result<(), Exit> {
     if !file || path.is_dir() {
         return may_create(path);
     }
-    Err(Exit::with_help(
-        BAD_INPUT,
+    Err(Exit::refused(
         format!("{} is a folder with the extension of a file", path.display()),
         "use a name without this extension; from-scan writes a single grain to NAME.grain",
     ))

@@ -97,8 +97,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
                 labels[..labels.len().min(10)].join(", "),
                 if labels.len() > 10 { ", ..." } else { "" }
             );
-            return Err(Exit::with_help(
-                BAD_INPUT,
+            return Err(Exit::refused(
                 message,
                 "select one with --label N, or write all to a folder with -o DIR; if the values are grey values instead of labels, add --threshold otsu",
             ));
@@ -109,8 +108,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
 
 fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     if args.median && args.threshold.is_none() {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             "--median filters grey values before the threshold, and there is no --threshold",
             "add --threshold otsu or a grey value, or omit --median for an image of labels",
         ));
@@ -123,8 +121,7 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
         Some("otsu") => Some(Threshold::Otsu),
         Some("otsu3") => Some(Threshold::Otsu3),
         Some(text) => Some(Threshold::Value(text.parse().map_err(|_| {
-            Exit::with_help(
-                BAD_INPUT,
+            Exit::refused(
                 format!("--threshold: {text:?} is not a number"),
                 "use a grey value, otsu or otsu3",
             )

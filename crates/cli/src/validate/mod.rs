@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_formats::summary::Summary;
-use grainwake_run::case::{Case, nearest};
+use grainwake_run::case::{Case, did_you_mean};
 use grainwake_run::provenance::Provenance;
 use grainwake_run::{Ending, Existing, Options, RunError};
 use grainwake_validation::{Level, Library, Suite, SuiteError, SuiteRun};
@@ -18,7 +18,7 @@ use table::{line, table};
 
 use crate::args::ValidateArgs;
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
-use crate::progress::{ProgressDisplay, clock};
+use crate::progress::{self, clock};
 use crate::{print, signals, tell, threads};
 
 impl From<SuiteError> for Exit {
@@ -80,8 +80,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         }
     }
     if args.judge && results.is_empty() {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             format!("{}: no finished run of these validations", args.output.display()),
             "omit --judge to execute them, or give their folder with -o",
         ));
@@ -123,8 +122,7 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
 fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
     let known: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
     if all.is_empty() {
-        return Err(Exit::with_help(
-            BAD_INPUT,
+        return Err(Exit::refused(
             "there is no validation in the folder",
             "each is a folder with a validation.toml; give their parent with --suites",
         ));
@@ -134,19 +132,15 @@ fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
         if let Some(suite) = all.iter().find(|s| s.name == suite && !run.is_empty()) {
             let runs: Vec<&str> = suite.runs.iter().map(|r| r.name.as_str()).collect();
             if !runs.contains(&run) {
-                let hint = nearest(run, runs.iter().copied())
-                    .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
-                return Err(Exit::with_help(
-                    BAD_INPUT,
+                let hint = did_you_mean(run, runs.iter().copied());
+                return Err(Exit::refused(
                     format!("the validation \"{}\" has no run \"{run}\"", suite.name),
                     format!("{hint}It has: {}", runs.join(", ")),
                 ));
             }
         } else if !known.iter().any(|known| known == name) {
-            let hint = nearest(name, known.iter().map(String::as_str))
-                .map_or(String::new(), |n| format!("did you mean \"{n}\"? "));
-            return Err(Exit::with_help(
-                BAD_INPUT,
+            let hint = did_you_mean(name, known.iter().map(String::as_str));
+            return Err(Exit::refused(
                 format!("there is no validation \"{name}\""),
                 format!("{hint}There are: {}", known.join(", ")),
             ));
@@ -192,21 +186,10 @@ fn execute(
         let cells = case.setup.mesh.cells;
         tell!("{}/{}: {} x {} x {} cells", suite.name, run.name, cells[0], cells[1], cells[2]);
     }
-    let options = Options {
-        existing: if args.resume { Existing::Reuse } else { Existing::Replace },
-        command: std::env::args().collect(),
-        threads,
-        parent: None,
-        controlled_from: None,
-    };
-    let diameter = case.setup.grains.first().map(|g| g.shape.equivalent_diameter());
-    let mut shown = ProgressDisplay::new(args.quiet, stop.clone(), diameter);
-    let ending = threads::on(threads, || {
-        let ending = grainwake_run::run(case.job(), folder, &options, &mut shown);
-        shown.clear();
-        ending
-    })?;
-    match ending {
+    let existing = if args.resume { Existing::Reuse } else { Existing::Replace };
+    let command = std::env::args().collect();
+    let options = Options { existing, command, threads, ..Options::default() };
+    match progress::run(case.job(), folder, &options, args.quiet, stop.clone())? {
         Ok(Ending::Interrupted(_)) => Err(Exit::with_help(
             INTERRUPTED,
             "interrupted; a checkpoint was written",

@@ -1,7 +1,9 @@
 //! Text form of the results of checks.
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 use grainwake_validation::CheckResult;
+
+use crate::out::markdown;
 
 fn number(value: Option<f64>) -> String {
     match value {
@@ -47,20 +49,9 @@ pub fn line(v: &CheckResult) -> String {
 
 /// Returns results as a Markdown table.
 pub fn table(results: &[CheckResult]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header([
-        "validation",
-        "run",
-        "quantity",
-        "value",
-        "reference",
-        "error",
-        "bound",
-        "verdict",
-    ]);
-    for v in results {
-        table.add_row([
+    let header = "validation,run,quantity,value,reference,error,bound,verdict".split(',');
+    let row = |v: &CheckResult| {
+        vec![
             v.name.clone(),
             v.run.clone(),
             v.quantity.clone(),
@@ -69,12 +60,7 @@ pub fn table(results: &[CheckResult]) -> Table {
             error(v),
             v.bound.clone(),
             verdict(v).to_string(),
-        ]);
-    }
-    for column in 3..6 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    table
+        ]
+    };
+    markdown(header, results.iter().map(row), 3..6)
 }

@@ -80,20 +80,6 @@ impl Study {
         })
     }
 
-    /// Returns `runs/FOLDER`, or `runs/FOLDER-FILE` if the file is not called `study.toml`.
-    pub fn default_folder(&self) -> PathBuf {
-        let absolute = std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone());
-        let name = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned());
-        let stem = name(absolute.file_stem()).unwrap_or_else(|| "study".into());
-        let folder = name(absolute.parent().and_then(Path::file_name));
-        let name = match folder {
-            Some(folder) if stem == "study" => folder,
-            Some(folder) => format!("{folder}-{stem}"),
-            None => stem,
-        };
-        Path::new("runs").join(name)
-    }
-
     /// Returns a problem of the study file with its remedy and location.
     pub(crate) fn problem(
         &self,

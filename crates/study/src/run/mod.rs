@@ -185,8 +185,7 @@ impl Job<'_> {
                 existing,
                 command: self.options.command.clone(),
                 threads: self.options.threads,
-                parent: None,
-                controlled_from: None,
+                ..Default::default()
             };
             grainwake_run::run(case.job(), &folder, &options, &mut Forward(self))
         };
