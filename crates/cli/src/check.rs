@@ -119,20 +119,20 @@ fn short(value: f64) -> String {
     number(format!("{value:.3e}").parse().unwrap_or(value))
 }
 
+/// Returns the least and the largest value of a positive property of the grains.
+fn range(case: &Case, property: fn(&Grain) -> f64) -> (f64, f64) {
+    let values = case.setup.grains.iter().map(property);
+    values.fold((f64::INFINITY, 0.0), |(a, b), v| (a.min(v), b.max(v)))
+}
+
 /// Returns whether the grains have different diameters or densities.
 fn differ(case: &Case) -> bool {
-    let of = |pick: &dyn Fn(&Grain) -> f64| {
-        let values = case.setup.grains.iter().map(pick);
-        values.fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)))
-    };
-    let sizes = of(&|g| g.shape.equivalent_diameter());
-    let densities = of(&|g| g.density);
-    [sizes, densities].iter().any(|(a, b)| b - a > 1e-9 * b)
+    let ranges = [range(case, |g| g.shape.equivalent_diameter()), range(case, |g| g.density)];
+    ranges.iter().any(|(a, b)| b - a > 1e-9 * b)
 }
 
 fn grains(case: &Case) -> String {
-    let diameters = case.setup.grains.iter().map(|g| 1e3 * g.shape.equivalent_diameter());
-    let (least, most) = diameters.fold((f64::INFINITY, 0.0_f64), |(a, b), d| (a.min(d), b.max(d)));
+    let (least, most) = range(case, |g| 1e3 * g.shape.equivalent_diameter());
     match case.setup.grains.len() {
         0 => "none".into(),
         n if most - least < 1e-9 * most => format!("{n}, equivalent diameter {} mm", short(most)),

@@ -1,6 +1,7 @@
 //! Exit codes and error messages.
 
 use std::io::ErrorKind;
+use std::path::Path;
 use std::process::ExitCode;
 
 use grainwake_run::case::{CaseError, Problem};
@@ -39,6 +40,18 @@ impl Exit {
     /// Creates a failure with one message.
     pub fn new(code: u8, message: impl Into<String>) -> Exit {
         Exit { code, problems: vec![Problem::new(message)] }
+    }
+    /// Creates a failure because of invalid input.
+    pub fn input(message: impl Into<String>) -> Exit {
+        Exit::new(BAD_INPUT, message)
+    }
+    /// Returns the failure at a file or folder as a function of its cause.
+    pub fn at<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Exit {
+        move |error| Exit::new(IO, format!("{}: {error}", path.display()))
+    }
+    /// Returns the failure of an action on a file or folder as a function of its cause.
+    pub fn cannot<E: std::fmt::Display>(action: &str, path: &Path) -> impl Fn(E) -> Exit {
+        move |error| Exit::new(IO, format!("cannot {action} {}: {error}", path.display()))
     }
     /// Creates a failure with one message and its remedy.
     pub fn with_help(code: u8, message: impl Into<String>, help: impl Into<String>) -> Exit {
@@ -83,6 +96,12 @@ impl Exit {
         };
         let messages: Vec<String> = self.problems.iter().map(message).collect();
         messages.join("\n")
+    }
+}
+
+impl From<Problem> for Exit {
+    fn from(problem: Problem) -> Exit {
+        Exit::problems(BAD_INPUT, vec![problem])
     }
 }
 

@@ -4,7 +4,7 @@ use clap::{Command, CommandFactory};
 use clap_mangen::Man;
 
 use crate::args::{Cli, ManArgs};
-use crate::exit::{Exit, IO};
+use crate::exit::Exit;
 use crate::out::{print, write};
 
 /// Prints the manual page of the program, or writes the pages of all commands into a folder.
@@ -14,13 +14,11 @@ pub fn man(args: &ManArgs) -> Result<(), Exit> {
     let Some(folder) = &args.output else {
         return write(&page(command)?);
     };
-    let failed =
-        |path: &std::path::Path, error| Exit::new(IO, format!("{}: {error}", path.display()));
-    std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+    std::fs::create_dir_all(folder).map_err(Exit::at(folder))?;
     let pages = pages(command);
     for command in &pages {
         let path = folder.join(format!("{}.1", name(command)));
-        std::fs::write(&path, page(command.clone())?).map_err(|e| failed(&path, e))?;
+        std::fs::write(&path, page(command.clone())?).map_err(Exit::at(&path))?;
     }
     print(&format!("{} pages in {}", pages.len(), folder.display()))
 }

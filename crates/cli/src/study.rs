@@ -57,12 +57,10 @@ impl From<StudyError> for Exit {
 /// Executes a study, or lists its runs.
 pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let study = kind::study(&args.study)?;
-    let selection = args.only.as_deref().map_or(Ok(Selection::All), Selection::parse);
-    let selection = selection.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
-    let plan = Plan::resolve(&study, &args.overrides.list())?.accepting(&args.accept);
-    let plan = plan.map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
+    let selection = args.only.as_deref().map_or(Ok(Selection::All), Selection::parse)?;
+    let plan = Plan::resolve(&study, &args.overrides.list())?.accepting(&args.accept)?;
     let runs = &plan.runs;
-    let chosen = selection.choose(runs).map_err(|p| Exit::problems(BAD_INPUT, vec![p]))?;
+    let chosen = selection.choose(runs)?;
     let folder =
         args.output.clone().unwrap_or_else(|| kind::default_folder(&args.study, "study", |_| true));
     let jobs = args.jobs.clamp(1, chosen.len().max(1));

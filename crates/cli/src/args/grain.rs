@@ -3,14 +3,6 @@
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// Arguments of `grain`.
-#[derive(Debug, Args)]
-pub struct GrainArgs {
-    /// Command.
-    #[command(subcommand)]
-    pub command: GrainCommand,
-}
-
 /// Commands of `grain`.
 #[derive(Debug, Subcommand)]
 pub enum GrainCommand {
@@ -19,7 +11,8 @@ pub enum GrainCommand {
     /// Create a grain from a closed surface mesh or from spherical harmonics
     FromMesh(FromMeshArgs),
     /// Create a grain of closed form: sphere, ellipsoid, box, cylinder, capsule, superquadric
-    Make(MakeArgs),
+    #[command(subcommand)]
+    Make(Body),
     /// Generate grains of given sphericity and roundness, one for each pair
     Family(FamilyArgs),
     /// Print the size and morphology of grain files
@@ -157,14 +150,6 @@ pub struct FamilyArgs {
     /// Other options.
     #[command(flatten)]
     pub common: GrainOptions,
-}
-
-/// Arguments of `grain make`.
-#[derive(Debug, Args)]
-pub struct MakeArgs {
-    /// Shape.
-    #[command(subcommand)]
-    pub body: Body,
 }
 
 /// Analytic shapes.

@@ -1,32 +1,25 @@
-//! Arguments of the command line, one module per command.
+//! Arguments of the command line; a command with many of them has a module.
 
 mod bench;
 mod grain;
-mod man;
-mod overrides;
-mod report;
 mod run;
 mod study;
 mod validate;
-mod view;
 
+use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use grainwake_run::provenance;
 
 pub use bench::BenchArgs;
 pub use grain::{
-    Body, CompareArgs, ExportArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainArgs, GrainCommand,
-    InfoArgs, NewGrain,
+    Body, CompareArgs, ExportArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainCommand, InfoArgs,
+    NewGrain,
 };
-pub use man::ManArgs;
-pub use overrides::Overrides;
-pub use report::ReportArgs;
 pub use run::{CheckArgs, RunArgs};
 pub use study::StudyArgs;
 pub use validate::ValidateArgs;
-pub use view::ViewArgs;
 
 /// Version and commit, as in `provenance.json`.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -52,7 +45,8 @@ pub enum Command {
     /// Check a case without running it: derived numbers, cost and warnings
     Check(CheckArgs),
     /// Create, inspect and compare grain shapes
-    Grain(GrainArgs),
+    #[command(subcommand)]
+    Grain(GrainCommand),
     /// Run the validation cases and compare them with references
     Validate(ValidateArgs),
     /// Run a parameter study; finished runs are kept, interrupted runs are resumed
@@ -72,4 +66,58 @@ pub enum Command {
     },
     /// Print the manual page (roff)
     Man(ManArgs),
+}
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Run folder or study folder
+    pub run: PathBuf,
+    /// Write a film of a run folder instead: film.gif, and film/frame-0001.png, ... for ffmpeg
+    #[arg(long)]
+    pub film: bool,
+}
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// Run folders, or one study folder; a run that is still going is followed
+    #[arg(required = true, value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+    /// Port on 127.0.0.1; 0 takes any free port
+    #[arg(long, value_name = "N", default_value_t = 8317, conflicts_with = "save")]
+    pub port: u16,
+    /// Open the page in the default browser
+    #[arg(long, conflicts_with = "save")]
+    pub open: bool,
+    /// Write one self-contained page that works from disk, instead of serving
+    #[arg(long, value_name = "PAGE.html")]
+    pub save: Option<PathBuf>,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Write one page per command into this folder instead, for example share/man/man1
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+}
+
+/// Options `--set` and `--unset`.
+#[derive(Debug, Args)]
+pub struct Overrides {
+    /// Override a value of the case, or of every case, for example time.end=0.5 or
+    /// grain.0.density=2600
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Remove a key of the case, so that its default applies, for example time.step; before --set
+    #[arg(long = "unset", value_name = "KEY")]
+    unset: Vec<String>,
+}
+
+impl Overrides {
+    /// Returns the changes in the syntax of `Case::load`, removals first.
+    pub fn list(&self) -> Vec<String> {
+        self.unset.iter().map(|key| format!("-{key}")).chain(self.set.iter().cloned()).collect()
+    }
 }

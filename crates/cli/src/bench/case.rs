@@ -12,20 +12,7 @@ use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::Precision;
 use grainwake_solver::sim::{Setup, StepRule};
 
-use crate::exit::{BAD_INPUT, Exit};
-
-/// Benchmark case.
-#[derive(Clone, Copy)]
-pub struct BenchCase {
-    /// Cells along x, y, z.
-    pub cells: [usize; 3],
-    /// Number of grains.
-    pub grains: usize,
-    /// Coupling scheme.
-    pub scheme: Scheme,
-    /// Precision of the fields.
-    pub precision: Precision,
-}
+use crate::exit::Exit;
 
 /// Cells that a grain takes along each axis: its longest axis and two.
 const CELLS_PER_GRAIN: usize = 11;
@@ -39,12 +26,9 @@ fn positions(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
         .find(|pitch| across(*pitch).iter().product::<usize>() >= grains);
     let Some(pitch) = pitch else {
         let most = across(CELLS_PER_GRAIN).iter().product::<usize>();
-        return Err(Exit::new(
-            BAD_INPUT,
-            format!(
-                "--grains {grains}: at most {most} fit into {cells:?} cells; a larger --size takes more"
-            ),
-        ));
+        return Err(Exit::input(format!(
+            "--grains {grains}: at most {most} fit into {cells:?} cells; a larger --size takes more"
+        )));
     };
     let [nx, ny, nz] = across(pitch);
     let total = nx * ny * nz;
@@ -56,33 +40,34 @@ fn positions(cells: [usize; 3], grains: usize) -> Result<Vec<DVec3>, Exit> {
     Ok(all.collect())
 }
 
-impl BenchCase {
-    /// Set-up: sampled grains of eight cells diameter in water.
-    pub fn setup(&self) -> Result<Setup, Exit> {
-        let BenchCase { cells, grains, scheme, precision } = *self;
-        let spacing = 0.25e-3;
-        let mesh = Mesh::cubic(cells, spacing);
-        let radius = 4.0 * spacing;
-        let axes = [1.1 * radius, radius, radius / 1.1];
-        let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
-        let shape = Arc::new(shape.expect("a plain ellipsoid"));
-        let grain = |position: DVec3| {
-            // Every grain has its own orientation.
-            let orientation = DQuat::from_scaled_axis(7.0 * position);
-            Grain::new(shape.clone(), 1500.0)
-                .with_position(mesh.extent() * position)
-                .with_orientation(orientation)
-        };
-        Ok(Setup::new(mesh)
-            .with_fluid(FluidParams::new(1000.0, 1e-6))
-            .with_precision(precision)
-            .with_scheme(scheme)
-            .with_gravity(DVec3::new(0.0, 0.0, -9.81))
-            .with_grains(positions(cells, grains)?.into_iter().map(grain))
-            .with_step(StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 1e-3 }))
-    }
+/// Returns a set-up of sampled grains of eight cells diameter in water.
+pub fn setup(
+    cells: [usize; 3],
+    grains: usize,
+    scheme: Scheme,
+    precision: Precision,
+) -> Result<Setup, Exit> {
+    let spacing = 0.25e-3;
+    let mesh = Mesh::cubic(cells, spacing);
+    let radius = 4.0 * spacing;
+    let axes = [1.1 * radius, radius, radius / 1.1];
+    let shape = ellipsoid(axes[0], axes[1], axes[2], &ShapeOptions::default());
+    let shape = Arc::new(shape.expect("a plain ellipsoid"));
+    let grain = |position: DVec3| {
+        // Every grain has its own orientation.
+        let orientation = DQuat::from_scaled_axis(7.0 * position);
+        Grain::new(shape.clone(), 1500.0)
+            .with_position(mesh.extent() * position)
+            .with_orientation(orientation)
+    };
+    Ok(Setup::new(mesh)
+        .with_fluid(FluidParams::new(1000.0, 1e-6))
+        .with_precision(precision)
+        .with_scheme(scheme)
+        .with_gravity(DVec3::new(0.0, 0.0, -9.81))
+        .with_grains(positions(cells, grains)?.into_iter().map(grain))
+        .with_step(StepRule::Limits { cfl: 0.3, viscous: 0.2, max_step: 1e-3 }))
 }
-
 #[cfg(test)]
 mod tests {
     use super::*;

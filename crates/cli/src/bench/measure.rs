@@ -7,7 +7,8 @@ use grainwake_solver::sim::{Setup, Simulation};
 use serde::Serialize;
 
 use super::triad;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::args::BenchArgs;
+use crate::exit::Exit;
 
 /// Numbers per cell that each pass reads from and writes to memory (write-allocate traffic is not
 /// counted, as in the triad):
@@ -21,16 +22,6 @@ use crate::exit::{BAD_INPUT, Exit};
 /// planes of modes, and every plane needs all columns.
 const TRAFFIC: [(&str, f64); 4] =
     [("predict", 13.0), ("divergence", 4.0), ("columns", 2.0), ("correct", 9.0)];
-/// Steps to take.
-#[derive(Clone, Copy, Debug)]
-pub struct Steps {
-    /// Steps before the timed ones.
-    pub untimed: u64,
-    /// Timed steps.
-    pub timed: u64,
-    /// Threads.
-    pub threads: usize,
-}
 
 /// Measurement of one case. The JSON names are stable.
 #[derive(Debug, Serialize)]
@@ -92,20 +83,20 @@ pub struct Pass {
     pub limit_ns_per_cell_step: Option<f64>,
 }
 
-/// Times the steps of a simulation.
-pub fn measure(setup: Setup, steps: &Steps) -> Result<Measured, Exit> {
+/// Times the steps of a simulation on this many threads.
+pub fn measure(setup: Setup, args: &BenchArgs, threads: usize) -> Result<Measured, Exit> {
     let wet = setup.fluid.is_some();
     let (cells, grains, precision) = (setup.mesh.cells, setup.grains.len(), setup.precision);
-    let mut sim = Simulation::new(setup).map_err(|e| Exit::new(BAD_INPUT, e.to_string()))?;
+    let mut sim = Simulation::new(setup).map_err(|e| Exit::input(e.to_string()))?;
     let advance =
         |sim: &mut Simulation| sim.step(f64::INFINITY).map_err(|e| Exit::new(3, e.to_string()));
-    for _ in 0..steps.untimed {
+    for _ in 0..args.warm_up {
         advance(&mut sim)?;
     }
     let mut totals = Vec::new();
     let mut by_step = Vec::new();
     let (mut substeps, mut pairs) = (Vec::new(), Vec::new());
-    for _ in 0..steps.timed {
+    for _ in 0..args.steps {
         let (before, start) = (sim.pass_times(), Stopwatch::start());
         advance(&mut sim)?;
         let total = start.elapsed();
@@ -156,10 +147,10 @@ pub fn measure(setup: Setup, steps: &Steps) -> Result<Measured, Exit> {
     });
     Ok(Measured {
         grains,
-        threads: steps.threads,
+        threads,
         precision,
         instructions: instructions().name(),
-        steps: steps.timed,
+        steps: args.steps,
         seconds_per_step,
         substeps_per_step: Counts::of(&substeps),
         contact_pairs: Counts::of(&pairs),

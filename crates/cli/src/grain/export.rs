@@ -5,7 +5,7 @@ use grainwake_shape::mesh::{MeshFormat, write_mesh};
 
 use super::{may_write, mesh_unit, not_input};
 use crate::args::ExportArgs;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::Exit;
 use crate::print;
 
 /// Writes the surface of a grain in its principal frame, with the centroid at the origin.
@@ -19,7 +19,7 @@ pub fn export(args: &ExportArgs) -> Result<(), Exit> {
     };
     let unit = mesh_unit(&args.unit)?;
     if !(unit.is_finite() && unit > 0.0) {
-        return Err(Exit::new(BAD_INPUT, "--unit: the length must be positive"));
+        return Err(Exit::input("--unit: the length must be positive"));
     }
     not_input(&args.output, &args.grain)?;
     may_write(&args.output, args.force)?;

@@ -6,7 +6,7 @@ use grainwake_shape::{ShapeError, write_table};
 
 use super::{create, folder, length, may_write, show};
 use crate::args::FamilyArgs;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::Exit;
 
 /// Pixels of one view in the contact sheet.
 const PIXELS: usize = 130;
@@ -20,10 +20,7 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
     options.cells = args.common.cells.or(options.cells);
     let count = args.sphericity.len() * args.roundness.len();
     if count > 999 {
-        return Err(Exit::new(
-            BAD_INPUT,
-            format!("the family has {count} grains, the maximum is 999"),
-        ));
+        return Err(Exit::input(format!("the family has {count} grains, the maximum is 999")));
     }
     let file = |n: usize| args.output.join(format!("{n:02}.grain"));
     let (table, sheet) = (args.output.join("table.csv"), args.output.join("sheet.png"));

@@ -18,16 +18,16 @@ use grainwake_run::number_format;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 
-use crate::args::{GrainArgs, GrainCommand, InfoArgs, NewGrain};
-use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::args::{GrainCommand, InfoArgs, NewGrain};
+use crate::exit::{Exit, IO};
 use crate::print;
 
 /// Runs one of the commands.
-pub fn grain(args: &GrainArgs) -> Result<(), Exit> {
-    match &args.command {
+pub fn grain(command: &GrainCommand) -> Result<(), Exit> {
+    match command {
         GrainCommand::FromScan(args) => scan::from_scan(args),
         GrainCommand::FromMesh(args) => mesh::from_mesh(args),
-        GrainCommand::Make(args) => make::make(&args.body),
+        GrainCommand::Make(args) => make::make(args),
         GrainCommand::Family(args) => family::family(args),
         GrainCommand::Info(args) => info(args),
         GrainCommand::Compare(args) => compare::compare(args),
@@ -44,7 +44,7 @@ fn mesh_unit(text: &str) -> Result<f64, Exit> {
 
 /// Parses a length of the command line [m].
 fn length(name: &str, text: &str) -> Result<f64, Exit> {
-    parse_length(text).map_err(|message| Exit::new(BAD_INPUT, format!("{name}: {message}")))
+    parse_length(text).map_err(|message| Exit::input(format!("{name}: {message}")))
 }
 
 /// Accepted equivalent diameters [m]; others indicate a wrong unit.
@@ -156,9 +156,7 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Creates a folder and those above it.
 fn create(folder: &Path) -> Result<(), Exit> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        Exit::new(IO, format!("cannot create the folder {}: {error}", folder.display()))
-    })
+    std::fs::create_dir_all(folder).map_err(Exit::cannot("create the folder", folder))
 }
 
 /// Refuses a file name without the extension `.grain`.

@@ -12,7 +12,7 @@ use grainwake_shape::scan::{Scan, Volume, Voxels};
 
 use super::refused::{line, trial};
 use crate::args::FromScanArgs;
-use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::exit::Exit;
 use crate::progress::count;
 
 /// Colours of kept grains, cool; neighbours mostly differ, since a label takes the colour of its
@@ -43,18 +43,12 @@ struct Slice {
     at: usize,
 }
 
-/// Outcome of a label: a kept grain, or a rejected label with the index of its reason.
-#[derive(Clone, Copy)]
-enum Fate {
-    Kept,
-    Rejected(usize),
-}
-
 /// The image with the results of the scan.
 struct Image<'a> {
     dims: [usize; 3],
     labels: &'a [u32],
-    fates: HashMap<u32, Fate>,
+    /// Index of the colour of a label, and whether it is hatched as rejected.
+    colours: HashMap<u32, (usize, bool)>,
     /// Grey level of a voxel, 0 to 1.
     grey: Box<dyn Fn(usize) -> f64 + 'a>,
 }
@@ -62,26 +56,24 @@ struct Image<'a> {
 /// Draws three slices along z, one along y and one along x, with a legend.
 pub fn draw(picture: &Path, args: &FromScanArgs, volume: &Volume, scan: &Scan) -> Result<(), Exit> {
     let Voxels::Labels(labels) = &scan.labels.voxels else {
-        return Err(Exit::new(BAD_INPUT, "the image has no labels"));
+        return Err(Exit::input("the image has no labels"));
     };
-    let kept = scan.grains.iter().filter(|g| g.shape.is_ok()).map(|g| (g.label, Fate::Kept));
+    let kept = scan.grains.iter().filter(|g| g.shape.is_ok());
+    let kept = kept.map(|g| (g.label, (g.label as usize % KEPT.len(), false)));
     let rejected = scan.refusals.iter().enumerate().flat_map(|(n, refusal)| {
-        refusal.labels.iter().map(move |label| (*label, Fate::Rejected(n)))
+        refusal.labels.iter().map(move |label| (*label, (rejected_colour(n), true)))
     });
     let dims = volume.dims;
-    let fates = kept.chain(rejected).collect();
-    let image = Image { dims, labels, fates, grey: greys(volume, args.threshold.is_some()) };
+    let colours = kept.chain(rejected).collect();
+    let image = Image { dims, labels, colours, grey: greys(volume, args.threshold.is_some()) };
     let panels = [(2, 1, 4), (2, 2, 4), (2, 3, 4), (1, 1, 2), (0, 1, 2)].map(|(normal, n, of)| {
         let [right, down] = [[1, 2], [0, 2], [0, 1]][normal];
         Slice { right, down, normal, at: dims[normal] * n / of }
     });
     let legend = legend(args, dims, scan);
     let drawing = page(&image, &panels, &legend);
-    let failed =
-        |error: String| Exit::new(IO, format!("cannot draw {}: {error}", picture.display()));
-    let png = drawing.to_png().map_err(failed)?;
-    std::fs::write(picture, png)
-        .map_err(|error| Exit::new(IO, format!("cannot write {}: {error}", picture.display())))
+    let png = drawing.to_png().map_err(Exit::cannot("draw", picture))?;
+    std::fs::write(picture, png).map_err(Exit::cannot("write", picture))
 }
 
 /// Returns the grey levels between the 1st and 99th percentile; labels are plain on white.
@@ -121,12 +113,9 @@ fn plain(grey: f64) -> u8 {
     (grey * (GREYS - 1) as f64).round() as u8
 }
 
-/// Returns the colour index of a label.
-fn colour(fate: Fate, label: u32) -> usize {
-    match fate {
-        Fate::Kept => label as usize % KEPT.len(),
-        Fate::Rejected(reason) => KEPT.len() + reason % REJECTED.len(),
-    }
+/// Returns the colour index of the labels rejected for the n-th reason.
+fn rejected_colour(n: usize) -> usize {
+    KEPT.len() + n % REJECTED.len()
 }
 
 /// Returns whether a pixel of a hatched region shows the colour.
@@ -153,10 +142,10 @@ impl Image<'_> {
                 let own = label(x, y);
                 let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
                 let edge = own != label(right, y) || own != label(x, below);
-                pixels.push(match self.fates.get(&own) {
+                pixels.push(match self.colours.get(&own) {
                     _ if edge => plain(1.0),
-                    Some(Fate::Kept) => shade(colour(Fate::Kept, own), grey),
-                    Some(fate) if hatched(x, y) => shade(colour(*fate, own), 1.0),
+                    Some((colour, false)) => shade(*colour, grey),
+                    Some((colour, true)) if hatched(x, y) => shade(*colour, 1.0),
                     _ => plain(grey),
                 });
             }
@@ -203,7 +192,7 @@ fn legend(args: &FromScanArgs, dims: [usize; 3], scan: &Scan) -> Vec<Row> {
         text: format!("{} kept", count(kept, "grain")),
     };
     let rejected = scan.refusals.iter().enumerate().flat_map(|(n, refusal)| {
-        let colours = vec![colour(Fate::Rejected(n), 0)];
+        let colours = vec![rejected_colour(n)];
         let reason = Row { colours, hatch: true, text: line(refusal) };
         let trial = trial(refusal, args.rescue);
         let trial = trial.map(|text| Row { colours: Vec::new(), hatch: false, text });
@@ -265,18 +254,13 @@ fn panel(
 /// Draws a row of the legend at this height; the first is a title.
 fn entry(drawing: &mut Drawing, row: &Row, middle: f64, title: bool) {
     let swatch = 8.0;
-    let pixels = (swatch * PIXELS_PER_POINT) as usize;
+    let side = (swatch * PIXELS_PER_POINT) as usize;
     for (n, colour) in row.colours.iter().enumerate() {
         let at = |n: usize| {
-            if row.hatch && !hatched(n % pixels, n / pixels) {
-                plain(0.8)
-            } else {
-                shade(*colour, 0.8)
-            }
+            if row.hatch && !hatched(n % side, n / side) { plain(0.8) } else { shade(*colour, 0.8) }
         };
-        let pixels = (0..pixels * pixels).map(at).collect::<Vec<u8>>();
-        let size = (swatch * PIXELS_PER_POINT) as usize;
-        let raster = Raster { width: size, height: size, pixels, palette: palette() };
+        let pixels = (0..side * side).map(at).collect();
+        let raster = Raster { width: side, height: side, pixels, palette: palette() };
         drawing.raster((swatch + 2.0) * n as f64, middle - 0.5 * swatch, swatch, swatch, raster);
     }
     let size = if title { TEXT } else { SMALL };

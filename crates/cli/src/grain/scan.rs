@@ -18,7 +18,7 @@ use super::{
     sized,
 };
 use crate::args::FromScanArgs;
-use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::exit::{BAD_INPUT, Exit};
 use crate::progress::count;
 use crate::{print, tell};
 
@@ -216,8 +216,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     }
     // Grains of an earlier command are not part of the new table and label image.
     for file in earlier.iter().filter(|_| largest.is_some()) {
-        let failed = |e| Exit::new(IO, format!("cannot remove {}: {e}", file.display()));
-        std::fs::remove_file(file).map_err(failed)?;
+        std::fs::remove_file(file).map_err(Exit::cannot("remove", file))?;
     }
     if largest.is_some() {
         create(place)?;

@@ -24,7 +24,7 @@ use crate::{print, signals, tell, threads};
 impl From<SuiteError> for Exit {
     fn from(error: SuiteError) -> Exit {
         match error {
-            SuiteError::Invalid(problem) => Exit::problems(BAD_INPUT, vec![*problem]),
+            SuiteError::Invalid(problem) => (*problem).into(),
             SuiteError::Unreadable { ref source, .. } => {
                 let missing = source.kind() == std::io::ErrorKind::NotFound;
                 Exit::with_help(

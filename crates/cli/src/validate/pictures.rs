@@ -7,7 +7,7 @@ use grainwake_report::write_figure;
 use grainwake_validation::Suite;
 
 use super::saved::Saved;
-use crate::exit::{Exit, IO};
+use crate::exit::Exit;
 use crate::tell;
 
 /// Draws the figures of `suites` into `folder/figures`, from the runs below `output` and the
@@ -15,8 +15,7 @@ use crate::tell;
 /// figure does not replace an existing one.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
-    std::fs::create_dir_all(&place)
-        .map_err(|e| Exit::new(IO, format!("{}: {e}", place.display())))?;
+    std::fs::create_dir_all(&place).map_err(Exit::at(&place))?;
     let mut count = 0;
     for suite in suites {
         for figure in &suite.figures {
@@ -61,5 +60,5 @@ pub fn list(folder: &Path, suites: &[Suite]) -> Result<(), Exit> {
         }
     }
     let page = place.join("README.md");
-    std::fs::write(&page, text).map_err(|e| Exit::new(IO, format!("{}: {e}", page.display())))
+    std::fs::write(&page, text).map_err(Exit::at(&page))
 }

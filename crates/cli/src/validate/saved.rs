@@ -9,7 +9,7 @@ use grainwake_validation::{CheckResult, Suite};
 use serde::{Deserialize, Serialize};
 
 use super::table::table;
-use crate::exit::{Exit, IO};
+use crate::exit::Exit;
 
 /// Contents of `LEVEL.json`.
 #[derive(Default, Serialize, Deserialize)]
@@ -59,14 +59,11 @@ pub fn add(
     output: &Path,
     suites: &[Suite],
 ) -> Result<Saved, Exit> {
-    let failed = |path: &Path, what: &dyn std::fmt::Display| {
-        Exit::new(IO, format!("{}: {what}", path.display()))
-    };
     let json = folder.join(format!("{level}.json"));
     let mut saved = match std::fs::read_to_string(&json) {
-        Ok(text) => serde_json::from_str(&text).map_err(|e| failed(&json, &e))?,
+        Ok(text) => serde_json::from_str(&text).map_err(Exit::at(&json))?,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Saved::default(),
-        Err(error) => return Err(failed(&json, &error)),
+        Err(error) => return Err(Exit::at(&json)(error)),
     };
     let key = |v: &CheckResult| (v.name.clone(), v.run.clone());
     let new: Vec<_> = results.iter().map(key).collect();
@@ -103,11 +100,10 @@ pub fn add(
         }
     }
     saved.runs.sort_by_key(|r| place(suites, &r.name, &r.run));
-    std::fs::create_dir_all(folder).map_err(|e| failed(folder, &e))?;
-    std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n")
-        .map_err(|e| failed(&json, &e))?;
+    std::fs::create_dir_all(folder).map_err(Exit::at(folder))?;
+    std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n").map_err(Exit::at(&json))?;
     let page = folder.join(format!("{level}.md"));
-    std::fs::write(&page, markdown(level, &saved)).map_err(|e| failed(&page, &e))?;
+    std::fs::write(&page, markdown(level, &saved)).map_err(Exit::at(&page))?;
     Ok(saved)
 }
 
