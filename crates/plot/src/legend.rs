@@ -24,6 +24,25 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// Creates the entry of a line with an SVG dash pattern, or of a solid line.
+    pub fn line(
+        name: impl Into<String>,
+        colour: &'static str,
+        dash: Option<&'static str>,
+    ) -> Entry {
+        Entry { name: name.into(), colour, line: Some(dash.unwrap_or_default()), symbol: None }
+    }
+
+    /// Creates the entry of a symbol.
+    pub fn symbol(
+        name: impl Into<String>,
+        colour: &'static str,
+        marker: Marker,
+        fill: Fill,
+    ) -> Entry {
+        Entry { name: name.into(), colour, line: None, symbol: Some((marker, fill)) }
+    }
+
     /// Returns the width of the line or the symbol [pt].
     fn sample(&self) -> f64 {
         if self.line.is_some() { 14.0 } else { 7.0 }

@@ -49,12 +49,7 @@ impl Series {
 
     /// Returns the entry in the legend, if the curve has a name.
     fn entry(&self) -> Option<Entry> {
-        Some(Entry {
-            name: self.name.clone()?,
-            colour: self.colour,
-            line: Some(self.dash.unwrap_or_default()),
-            symbol: None,
-        })
+        Some(Entry::line(self.name.clone()?, self.colour, self.dash))
     }
 
     /// Returns the vertical values.

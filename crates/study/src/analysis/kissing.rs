@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::observation::observe;
+use super::observation::{Member, members, other_levels, unique};
 use super::statistics::{mean, median, outcome_interval, signed_rank};
 use super::survival::{Duration, log_rank, median_time};
 use crate::measure::record::RunRecord;
@@ -116,11 +116,6 @@ impl Outcomes {
     fn level(&self, axis: &str) -> Option<&str> {
         self.levels.get(axis).map(String::as_str)
     }
-    fn without(&self, axis: &str) -> BTreeMap<String, String> {
-        let mut levels = self.levels.clone();
-        levels.remove(axis);
-        levels
-    }
 }
 
 /// Two models that differ on one axis only.
@@ -174,41 +169,26 @@ pub fn kissing(analysis: &Analysis, records: &[RunRecord]) -> Option<KissingResu
 
 /// Returns the outcomes of all models on the axes.
 fn outcomes(records: &[RunRecord]) -> Vec<Outcomes> {
-    let mut models: Vec<(&str, Outcomes)> = Vec::new();
-    for record in records.iter().filter(|record| !record.levels.is_empty()) {
-        let Some((time, censored)) = observe(record, "kiss_time") else { continue };
-        let duration = Duration { time, censored };
-        match models.iter_mut().find(|(name, _)| *name == record.model) {
-            Some((_, model)) => drop(model.members.insert(record.member, duration)),
-            None => models.push((
-                &record.model,
-                Outcomes {
-                    levels: record.levels.clone(),
-                    members: BTreeMap::from([(record.member, duration)]),
-                },
-            )),
-        }
-    }
-    models.into_iter().map(|(_, model)| model).collect()
+    let duration = |(run, time, censored): Member| (run.member, Duration { time, censored });
+    let outcomes = |members: Vec<Member>| Outcomes {
+        levels: members[0].0.levels.clone(),
+        members: members.into_iter().map(duration).collect(),
+    };
+    let models = members(records, "kiss_time", &BTreeMap::new()).into_iter().map(outcomes);
+    models.filter(|model| !model.levels.is_empty()).collect()
 }
 
 /// Returns the levels of an axis in the order of the study file, whether their runs have finished
 /// or not.
 fn names(records: &[RunRecord], axis: &str) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for level in records.iter().filter_map(|record| record.levels.get(axis)) {
-        if !out.contains(level) {
-            out.push(level.clone());
-        }
-    }
-    out
+    unique(records.iter().filter_map(|record| record.levels.get(axis)))
 }
 
 /// Pairs the models at two levels of an axis that are equal on all other axes.
 fn matched<'a>(models: &[&'a Outcomes], axis: &str, first: &str, second: &str) -> Vec<Pair<'a>> {
     let at = |level: &str| {
         let here = models.iter().filter(move |m| m.level(axis) == Some(level));
-        here.map(|m| (m.without(axis), *m)).collect::<BTreeMap<_, _>>()
+        here.map(|m| (other_levels(&m.levels, axis), *m)).collect::<BTreeMap<_, _>>()
     };
     let second = at(second);
     let pair = |(key, model): (_, &'a Outcomes)| Some([model, *second.get(&key)?]);

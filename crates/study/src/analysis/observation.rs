@@ -30,13 +30,24 @@ impl Observation {
     pub fn rank_value(&self) -> f64 {
         if self.censored { f64::INFINITY } else { self.value }
     }
+}
 
-    /// Returns the levels on all axes but one.
-    pub fn other_levels(&self, axis: &str) -> BTreeMap<String, String> {
-        let mut levels = self.levels.clone();
-        levels.remove(axis);
-        levels
+/// Returns the levels on all axes but one.
+pub fn other_levels(levels: &BTreeMap<String, String>, axis: &str) -> BTreeMap<String, String> {
+    let mut others = levels.clone();
+    others.remove(axis);
+    others
+}
+
+/// Returns the distinct names, in order of first appearance.
+pub fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for name in names {
+        if !out.contains(name) {
+            out.push(name.clone());
+        }
     }
+    out
 }
 
 /// Returns a quantity of a run and whether it is right-censored.
@@ -128,7 +139,8 @@ pub fn matched<'a>(
 ) -> Vec<(&'a Observation, &'a Observation)> {
     let on = |o: &&Observation, level: &str| o.levels.get(axis).is_some_and(|l| l == level);
     let partner = |a: &'a Observation| {
-        let same = |b: &&Observation| on(b, second) && b.other_levels(axis) == a.other_levels(axis);
+        let others = other_levels(&a.levels, axis);
+        let same = |b: &&Observation| on(b, second) && other_levels(&b.levels, axis) == others;
         Some((a, all.iter().find(same)?))
     };
     all.iter().filter(|a| on(a, first)).filter_map(partner).collect()
@@ -140,7 +152,7 @@ pub fn matched<'a>(
 pub fn ranges(all: &[Observation], axis: &str) -> Vec<Observation> {
     let mut groups: BTreeMap<BTreeMap<String, String>, Vec<&Observation>> = BTreeMap::new();
     for observation in all.iter().filter(|o| o.levels.contains_key(axis)) {
-        groups.entry(observation.other_levels(axis)).or_default().push(observation);
+        groups.entry(other_levels(&observation.levels, axis)).or_default().push(observation);
     }
     let complete = groups.values().map(Vec::len).max().unwrap_or(0);
     let range = |group: &Vec<&Observation>| {

@@ -16,23 +16,9 @@ use crate::plan::{EARLIER_TABLE, TABLE};
 pub const SETTLING_TABLE: &str = "settling.csv";
 
 /// Columns of [`SETTLING_TABLE`]; from the fifth on they are fields of [`GrainSettling`].
-const SETTLING_HEADER: [&str; 15] = [
-    "run",
-    "model",
-    "member",
-    "grain",
-    "diameter_m",
-    "peak_speed_m_per_s",
-    "peak_reynolds",
-    "final_speed_m_per_s",
-    "final_reynolds",
-    "speed_change",
-    "mean_speed_m_per_s",
-    "landing_time_s",
-    "drift_m",
-    "long_axis_deg",
-    "turned_deg",
-];
+const SETTLING_HEADER: &str = "run,model,member,grain,diameter_m,peak_speed_m_per_s,peak_reynolds,\
+    final_speed_m_per_s,final_reynolds,speed_change,mean_speed_m_per_s,landing_time_s,drift_m,\
+    long_axis_deg,turned_deg";
 
 /// Writes `table.json`, `table.csv` and, if a run is not a pair, `settling.csv`. Finished runs of
 /// the last `table.json` that the records lack are kept in `table.earlier.json`.
@@ -96,14 +82,14 @@ pub fn columns(records: &[RunRecord]) -> Vec<&'static str> {
 
 /// Header and one row per grain of the runs that are not pairs, in SI units.
 fn settling_rows(records: &[RunRecord]) -> Vec<Vec<String>> {
-    let mut rows = vec![SETTLING_HEADER.map(str::to_owned).to_vec()];
+    let mut rows = vec![SETTLING_HEADER.split(',').map(str::to_owned).collect()];
     let row = |record: &RunRecord, grain: &GrainSettling| {
         let values = serde_json::to_value(grain).unwrap_or_default();
-        let value = |name: &&str| number(values.get(*name).and_then(serde_json::Value::as_f64));
+        let value = |name: &str| number(values.get(name).and_then(serde_json::Value::as_f64));
         let indices = [record.member, grain.grain].map(|n| n.to_string());
         let names = [record.name.clone(), record.model.clone()];
         let cells = names.into_iter().chain(indices);
-        cells.chain(SETTLING_HEADER[4..].iter().map(value)).collect()
+        cells.chain(SETTLING_HEADER.split(',').skip(4).map(value)).collect()
     };
     for record in records {
         let grains = record.settling.iter().flat_map(|s| &s.each);

@@ -11,6 +11,7 @@ use grainwake_run::case::Case;
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
+use crate::analysis::observation::unique;
 use crate::analysis::verdict::Finding;
 use crate::format::title;
 use crate::measure::record::RunRecord;
@@ -106,17 +107,6 @@ impl FigureData<'_> {
             _ => text::literal(&title(factor)),
         }
     }
-}
-
-/// Returns the distinct names, in order of first appearance.
-pub fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for name in names {
-        if !out.contains(name) {
-            out.push(name.clone());
-        }
-    }
-    out
 }
 
 /// Value with at most three decimals, or three significant digits if it is small.

@@ -7,9 +7,10 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, unique};
+use super::data::FigureData;
 use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::factor_mean::{FactorMean, KISSING_SHARE};
+use crate::analysis::observation::unique;
 use crate::format::title;
 
 const LEFT: f64 = 42.0;

@@ -36,6 +36,22 @@ enum Curve {
     Velocity,
 }
 
+/// Points of a line, its dash pattern, and what distinguishes it from the other lines of a run.
+type Line = (Vec<(f64, f64)>, Option<&'static str>, &'static str);
+
+impl Curve {
+    /// Returns the lines of a run.
+    fn lines(self, t: &Trajectory) -> Vec<Line> {
+        match self {
+            Curve::Gap => vec![(t.points(&t.distance), None, "")],
+            Curve::Velocity => vec![
+                (t.points(&t.velocity[1]), None, "-l"),
+                (t.points(&t.velocity[0]), DASHED, "-t"),
+            ],
+        }
+    }
+}
+
 /// One of the figures: number in the paper, factor of the panels, factor of the colours.
 struct Layout<'a> {
     number: &'a str,
@@ -126,16 +142,9 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
         let title = format!("{}  {}", letter(i), data.factor_label(by, *value));
         drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
         let mut draw = |t: &Trajectory, colour: &str, name: &str| {
-            let clip = format!("clip-{i}-{name}");
-            let mut line = |values: &[f64], dash, clip: &str| {
-                frame.curve(&mut drawing, &t.points(values), colour, dash, clip);
-            };
-            match curve {
-                Curve::Gap => line(&t.distance, None, &clip),
-                Curve::Velocity => {
-                    line(&t.velocity[1], None, &format!("{clip}-l"));
-                    line(&t.velocity[0], DASHED, &format!("{clip}-t"));
-                }
+            for (points, dash, suffix) in curve.lines(t) {
+                let clip = format!("clip-{i}-{name}{suffix}");
+                frame.curve(&mut drawing, &points, colour, dash, &clip);
             }
         };
         if let Some((_, trajectory)) = reference.filter(|_| curve == Curve::Gap) {
@@ -151,16 +160,9 @@ fn figure(data: &FigureData, runs: [&[&Run]; 2], layout: &Layout, level: &str) -
             draw(trajectory, colour_of(run), &run.name);
         }
         for (run, t) in members.iter().filter(here) {
-            let mut thin = |values: &[f64], dash| {
-                let points = t.points(values).into_iter().filter_map(|point| frame.position(point));
+            for (points, dash, _) in curve.lines(t) {
+                let points = points.into_iter().filter_map(|point| frame.position(point));
                 drawing.line(&points.collect::<Vec<_>>(), colour_of(run), THIN, dash);
-            };
-            match curve {
-                Curve::Gap => thin(&t.distance, None),
-                Curve::Velocity => {
-                    thin(&t.velocity[1], None);
-                    thin(&t.velocity[0], DASHED);
-                }
             }
         }
         frame.outline(&mut drawing, Labelled { across: row + 1 == rows, up: column == 0 });
@@ -201,32 +203,26 @@ fn colour(n: usize, count: usize) -> &'static str {
 
 /// Returns the legend of the colours and, by curve, of the grains or the reference.
 fn legend(data: &FigureData, layout: &Layout, reference: Option<&str>, values: &[f64]) -> Legend {
-    let entry = |name: String, colour: &'static str, dash: Option<&'static str>| Entry {
-        name,
-        colour,
-        line: Some(dash.unwrap_or_default()),
-        symbol: None,
-    };
     let mut entries: Vec<Entry> = Vec::new();
     let coloured: Vec<(&str, f64)> =
         values.iter().enumerate().map(|(n, v)| (colour(n, values.len()), *v)).collect();
     for group in coloured.chunk_by(|a, b| a.0 == b.0) {
         let [(colour, first), .., (_, last)] = group else {
             let (colour, value) = group[0];
-            entries.push(entry(data.factor_label(layout.within, value), colour, None));
+            entries.push(Entry::line(data.factor_label(layout.within, value), colour, None));
             continue;
         };
         let label = data.factor_label(layout.within, *first);
         let last = data.factor_value(layout.within, *last);
-        entries.push(entry(format!("{label} to {last}"), colour, None));
+        entries.push(Entry::line(format!("{label} to {last}"), colour, None));
     }
     match layout.curve {
         Curve::Velocity => {
-            entries.push(entry("leading".to_owned(), INK, None));
-            entries.push(entry("trailing".to_owned(), INK, DASHED));
+            entries.push(Entry::line("leading", INK, None));
+            entries.push(Entry::line("trailing", INK, DASHED));
         }
         Curve::Gap => {
-            entries.extend(reference.map(|name| entry(text::literal(name), INK, None)));
+            entries.extend(reference.map(|name| Entry::line(text::literal(name), INK, None)));
         }
     }
     Legend::new(entries, PAGE - LEFT)

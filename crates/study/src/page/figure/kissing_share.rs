@@ -7,9 +7,10 @@ use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, letter, text};
 
-use super::data::{FigureData, unique};
+use super::data::FigureData;
 use super::legend::LineStyle;
 use crate::analysis::kissing::Level;
+use crate::analysis::observation::unique;
 use crate::analysis::survival::kaplan_meier;
 
 const LEFT: f64 = 42.0;
@@ -34,11 +35,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let panels = grids.len().max(1);
     let across = panels.min(ACROSS);
     let width = (PAGE - LEFT - 8.0 - GAP * (across as f64 - 1.0)) / across as f64;
-    let entry = |(i, name): (usize, &String)| Entry {
-        name: text::literal(name),
-        colour: LineStyle::nth(i).colour,
-        line: Some(LineStyle::nth(i).dash.unwrap_or_default()),
-        symbol: None,
+    let entry = |(i, name): (usize, &String)| {
+        Entry::line(text::literal(name), LineStyle::nth(i).colour, LineStyle::nth(i).dash)
     };
     let legend = Legend::new(names.iter().enumerate().map(entry), PAGE - LEFT);
     let top = legend.height() + 8.0;

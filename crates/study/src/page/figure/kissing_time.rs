@@ -151,12 +151,8 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
     let censored = layout.censored();
     if censored > 0 {
-        entries.push(Entry {
-            name: "hollow: landed, or run ended, before kissing".into(),
-            colour: INK,
-            line: None,
-            symbol: Some((Marker::Circle, Fill::Hollow)),
-        });
+        let name = "hollow: landed, or run ended, before kissing";
+        entries.push(Entry::symbol(name, INK, Marker::Circle, Fill::Hollow));
     }
     let legend = Legend::new(entries, PAGE - LEFT);
     layout.frame.y = legend.height() + 10.5;

@@ -7,7 +7,8 @@ use grainwake_plot::style::{
 };
 use grainwake_plot::text;
 
-use super::data::{FigureData, unique};
+use super::data::FigureData;
+use crate::analysis::observation::unique;
 use crate::plan::Run;
 
 const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
@@ -53,12 +54,7 @@ impl LineStyle {
 
 /// Returns the entry of a legend with a symbol.
 pub fn symbol_entry(name: &str, style: LineStyle) -> Entry {
-    Entry {
-        name: text::literal(name),
-        colour: style.colour,
-        line: None,
-        symbol: Some((style.sign, Fill::Solid)),
-    }
+    Entry::symbol(text::literal(name), style.colour, style.sign, Fill::Solid)
 }
 
 /// Assignment of line styles to runs.
@@ -142,11 +138,9 @@ impl LineStyles {
 
     /// Returns the legend, with symbols or else lines, for a frame with the given left edge [pt].
     pub fn legend(&self, left: f64, symbols: bool) -> Legend {
-        let entry = |(name, style): (String, LineStyle)| Entry {
-            name: text::literal(&name),
-            colour: style.colour,
-            line: (!symbols).then_some(style.dash.unwrap_or_default()),
-            symbol: symbols.then_some((style.sign, Fill::Solid)),
+        let entry = |(name, style): (String, LineStyle)| match symbols {
+            true => symbol_entry(&name, style),
+            false => Entry::line(text::literal(&name), style.colour, style.dash),
         };
         Legend::new(self.entries().into_iter().map(entry), PAGE - left)
     }

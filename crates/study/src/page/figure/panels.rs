@@ -9,9 +9,9 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
-use super::data::{FigureData, unique};
+use super::data::FigureData;
 use super::legend::{LineStyles, axes};
-use crate::analysis::observation::{Observation, observations};
+use crate::analysis::observation::{Observation, observations, other_levels, unique};
 use crate::format::title;
 use crate::plan::quantities::SHAPE_FACTORS;
 
@@ -209,7 +209,7 @@ fn draw_panel(
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
     for observation in all {
         if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
-            lines.entry(observation.other_levels(axis)).or_default().push(point);
+            lines.entry(other_levels(&observation.levels, axis)).or_default().push(point);
         }
     }
     for line in lines.values_mut() {
