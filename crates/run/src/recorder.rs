@@ -26,7 +26,8 @@ pub(crate) struct Recorder {
     at_events: bool,
     tables: Tables,
     vtk: VtkOutput,
-    watch: Watch,
+    /// Watch of events and stop condition.
+    pub watch: Watch,
     /// Whether contacts with walls are events.
     with_walls: bool,
     series: Vec<Series>,
@@ -298,11 +299,6 @@ impl Recorder {
         record.next = self.series.iter().map(|series| series.next).collect();
         record.tracker = self.watch.tracker.state().clone();
         checkpoint::write(&self.run, record, sim, self.kept_checkpoints)
-    }
-
-    /// Returns the watch of events and stop condition.
-    pub fn watch(&self) -> &Watch {
-        &self.watch
     }
 
     /// Returns all events in the order of their confirmation.

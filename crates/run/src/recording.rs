@@ -191,10 +191,10 @@ struct Saved {
 /// steps uses it directly.
 pub struct Recording {
     out: PathBuf,
-    plan: RunPlan,
-    recorder: Recorder,
+    pub(crate) plan: RunPlan,
+    pub(crate) recorder: Recorder,
     provenance: Provenance,
-    meter: Meter,
+    pub(crate) meter: Meter,
     saved: Saved,
     _lock: Lock,
 }
@@ -226,21 +226,6 @@ impl Recording {
     /// Folder.
     pub fn folder(&self) -> &Path {
         &self.out
-    }
-
-    /// Plan of the run.
-    pub(crate) fn plan(&self) -> &RunPlan {
-        &self.plan
-    }
-
-    /// Recorder of the outputs.
-    pub(crate) fn recorder(&self) -> &Recorder {
-        &self.recorder
-    }
-
-    /// Wall-clock time of this session [s].
-    pub(crate) fn wall_s(&self) -> f64 {
-        self.meter.wall_s()
     }
 
     /// Takes one time step, writes the outputs and the checkpoint that are due, and returns the new
@@ -324,7 +309,7 @@ impl Recording {
 
     /// Returns the stop condition of the case, if it has held for its time.
     pub fn stopped(&self, sim: &Simulation) -> Option<EndReason> {
-        self.recorder.watch().stopped(sim)
+        self.recorder.watch.stopped(sim)
     }
 
     /// Returns the reason why the run is over: its end is reached, or its stop condition holds.

@@ -104,13 +104,13 @@ fn advance(
         for event in recording.step(&mut sim, f64::INFINITY)? {
             observer.event(&event);
         }
-        let tracker = &recording.recorder().watch().tracker;
+        let tracker = &recording.recorder.watch.tracker;
         observer.progress(&Progress {
             time: sim.time(),
-            end: recording.plan().end,
+            end: recording.plan.end,
             steps: sim.steps(),
             session_steps: sim.steps() - first_step,
-            wall_s: recording.wall_s(),
+            wall_s: recording.meter.wall_s(),
             from,
             dt: sim.time_step(),
             gap: tracker.gap(),

@@ -14,7 +14,6 @@ pub struct BenchArgs {
     #[arg(value_name = "CASE.toml", conflicts_with_all = ["size", "grains", "scheme", "precision",
         "scaling"])]
     pub case: Option<PathBuf>,
-    /// Changes of the case.
     #[command(flatten)]
     pub overrides: Overrides,
     /// Number of cells along x, y and z

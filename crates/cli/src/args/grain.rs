@@ -32,7 +32,6 @@ pub struct NewGrain {
     /// Rescale to this diameter of the sphere of equal volume, for example "2 mm"
     #[arg(long, value_name = "LENGTH")]
     pub equivalent_diameter: Option<String>,
-    /// Other options.
     #[command(flatten)]
     pub common: GrainOptions,
 }
@@ -65,7 +64,6 @@ pub struct FromMeshArgs {
     /// Invert a mesh with inward normals
     #[arg(long)]
     pub flip: bool,
-    /// Output and resolution.
     #[command(flatten)]
     pub new: NewGrain,
 }
@@ -121,7 +119,6 @@ pub struct FromScanArgs {
     /// Draw slices with the labels that would be kept and rejected into this PNG; write no grain
     #[arg(long, value_name = "FILE.png")]
     pub preview: Option<PathBuf>,
-    /// Output and resolution.
     #[command(flatten)]
     pub new: NewGrain,
 }
@@ -147,7 +144,6 @@ pub struct FamilyArgs {
     /// Folder for 01.grain, 02.grain, ... (row by row), table.csv and sheet.png
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Other options.
     #[command(flatten)]
     pub common: GrainOptions,
 }
@@ -159,7 +155,6 @@ pub enum Body {
     Sphere {
         /// Diameter
         diameter: String,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },
@@ -168,7 +163,6 @@ pub enum Body {
         /// Full axes, three lengths
         #[arg(num_args = 3)]
         axes: Vec<String>,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },
@@ -180,7 +174,6 @@ pub enum Body {
         /// Radius of the edges
         #[arg(long)]
         radius: String,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },
@@ -190,7 +183,6 @@ pub enum Body {
         diameter: String,
         /// Height
         height: String,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },
@@ -200,7 +192,6 @@ pub enum Body {
         diameter: String,
         /// Distance between the centres of the caps
         height: String,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },
@@ -212,7 +203,6 @@ pub enum Body {
         /// Exponents e1 and e2, 0.1 to 2
         #[arg(long, num_args = 2, required = true)]
         exponents: Vec<f64>,
-        /// Output and resolution.
         #[command(flatten)]
         new: NewGrain,
     },

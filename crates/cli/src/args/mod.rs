@@ -32,7 +32,6 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 #[command(name = "grainwake", version, long_version = VERSION.as_str(), about)]
 #[command(propagate_version = true)]
 pub struct Cli {
-    /// Command.
     #[command(subcommand)]
     pub command: Command,
 }

@@ -29,7 +29,6 @@ pub struct RunArgs {
     /// example runs/heap@0.5
     #[arg(long, value_name = "DIR[@TIME]", conflicts_with = "resume")]
     pub from: Option<String>,
-    /// Changes of the case.
     #[command(flatten)]
     pub overrides: Overrides,
     /// Do not draw the figures and report.html at the end of the run
@@ -51,7 +50,6 @@ pub struct CheckArgs {
     /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
-    /// Changes of the case.
     #[command(flatten)]
     pub overrides: Overrides,
     /// Print a JSON object

@@ -28,7 +28,6 @@ pub struct StudyArgs {
     /// Print the planned work with its estimated time and memory, without running any
     #[arg(long)]
     pub dry_run: bool,
-    /// Changes of all cases.
     #[command(flatten)]
     pub overrides: Overrides,
     /// Restart failed runs

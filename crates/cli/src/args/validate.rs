@@ -24,7 +24,6 @@ pub struct ValidateArgs {
     /// the figures
     #[arg(long, value_name = "DIR", conflicts_with_all = ["set", "unset"])]
     pub save: Option<PathBuf>,
-    /// Changes of all cases.
     #[command(flatten)]
     pub overrides: Overrides,
     /// Keep finished runs of the same case and program version, resume interrupted ones

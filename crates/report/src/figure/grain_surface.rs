@@ -178,10 +178,7 @@ pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, Gra
         }
         match run.surface(frame) {
             Ok(surface) => add_surfaces(&surface, frame.grain, frame.time, &run.grains, &mut out),
-            Err(what) => {
-                let name = run.short_name(&frame.file);
-                notes.push(format!("{name} was left out: {what}"));
-            }
+            Err(what) => notes.push(run.left_out(frame, &what)),
         }
     }
     out

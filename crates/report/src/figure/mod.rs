@@ -5,7 +5,7 @@ pub mod field;
 pub mod grain_surface;
 mod history;
 mod orientation;
-mod positions;
+pub(crate) mod positions;
 pub(crate) mod scene;
 pub mod section;
 pub(crate) mod slice_grid;

@@ -18,6 +18,17 @@ const MIDDLE: f64 = 44.0;
 /// Top margin [pt].
 const TOP: f64 = 8.0;
 
+/// Returns the style of a grain with this position on the colour scale, 0 to 1.
+pub(crate) fn grain_style(position: f64) -> String {
+    let colour = hex(sequential(position));
+    format!("fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" stroke-linejoin=\"round\"")
+}
+
+/// Returns the colours of a bar whose parts, 0 to 1, have the given positions on the colour scale.
+pub(crate) fn palette(position: fn(f64) -> f64) -> Vec<[u8; 3]> {
+    (0..256).map(|i| sequential(position(f64::from(i) / 255.0))).collect()
+}
+
 /// Returns whether an outline reaches into the window.
 fn is_seen(outline: &Outline, window: Window) -> bool {
     let range = |of: fn(&(f64, f64)) -> f64| extent(outline.iter().map(of));
@@ -93,11 +104,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         frame.clip(&mut drawing, &format!("clip-{i}"));
         for grain in order {
             let height = place(grain)[up];
-            let colour = hex(sequential((height - low) / (high - low).max(1e-12)));
-            let style = format!(
-                "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" \
-                 stroke-linejoin=\"round\""
-            );
+            let style = grain_style((height - low) / (high - low).max(1e-12));
             let outlines = scene.outlines(grain, last(grain), h, v);
             for (dx, dy) in scene.image_shifts(h, v) {
                 let shifted = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dy)).collect();
@@ -112,7 +119,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         let below = (tall || i == 1).then_some(names[0].as_str());
         frame.frame(&mut drawing, (below, Some(&names[1])));
     }
-    let palette: Vec<[u8; 3]> = (0..256).map(|i| sequential(f64::from(i) / 255.0)).collect();
+    let palette = palette(|part| part);
     let label = format!("height of the centre  [{unit}]");
     let axis = Axis::linear(&label, low * factor, high * factor, 5, AxisRange::Tight);
     let corner = (0.5 * total - 90.0, TOP + bottom + 30.0);

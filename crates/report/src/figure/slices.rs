@@ -3,7 +3,7 @@
 use grainwake_plot::axis::extent;
 use grainwake_plot::equal_aspect::{Window, length_unit};
 use grainwake_plot::style::series_colour;
-use grainwake_plot::{Figure, letter};
+use grainwake_plot::{Drawing, Figure, letter};
 
 use super::scene::{AXES, Scene};
 use super::section::Section;
@@ -31,8 +31,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
     let mut read = |frame: &FrameFile| -> Option<Section> {
         let image = scene.run.slice(frame);
         let section = image.and_then(|image| Section::of(&image, vertical));
-        let name = scene.run.short_name(&frame.file);
-        section.map_err(|what| notes.push(format!("{name} was left out: {what}"))).ok()
+        section.map_err(|what| notes.push(scene.run.left_out(frame, &what))).ok()
     };
     let mut out: Vec<Column> = Vec::new();
     let mut apart = false;
@@ -122,12 +121,18 @@ pub fn crop(scene: &Scene, columns: &mut [Column]) {
     }
 }
 
-fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
-    let scale = ColourScale::new(&Style::new(Quantity::Speed), columns);
+/// Draws a quantity; none if it is zero everywhere.
+fn draw(scene: &Scene, columns: &[Column], quantity: Quantity) -> Option<(ColourScale, Drawing)> {
+    let scale = ColourScale::new(&Style::new(quantity), columns);
     if scale.largest <= 0.0 {
         return None;
     }
     let drawing = slice_grid::draw(columns, &row_names(scene, columns), &scale, None)?;
+    Some((scale, drawing))
+}
+
+fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
+    let (scale, drawing) = draw(scene, columns, Quantity::Speed)?;
     let caption = format!(
         "{} Colour is the speed of the fluid, at most {} m/s; arrows show the velocity in the \
          plane, their length in proportion.",
@@ -138,11 +143,7 @@ fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
 }
 
 fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
-    let scale = ColourScale::new(&Style::new(Quantity::Vorticity), columns);
-    if scale.largest <= 0.0 {
-        return None;
-    }
-    let drawing = slice_grid::draw(columns, &row_names(scene, columns), &scale, None)?;
+    let (scale, drawing) = draw(scene, columns, Quantity::Vorticity)?;
     let view = columns.iter().flat_map(|c| c.sections.iter().flatten()).next()?.view;
     let sense = if view.clockwise() { "clockwise" } else { "anticlockwise" };
     let mut caption = format!(

@@ -2,7 +2,6 @@
 
 use grainwake_plot::Drawing;
 use grainwake_plot::axis::{Axis, AxisRange, extent};
-use grainwake_plot::colormap::{hex, sequential};
 use grainwake_plot::drawing::Anchor;
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::{INK, SMALL};
@@ -10,12 +9,19 @@ use grainwake_plot::style::{INK, SMALL};
 use super::{View, moments};
 use crate::features::short;
 use crate::figure::Scene;
+use crate::figure::positions::{grain_style, palette};
 use crate::figure::scene::AXES;
 
 /// Left and top margin [pt].
 const MARGIN: (f64, f64) = (38.0, 14.0);
 /// Room for the view [pt].
 const ROOM: (f64, f64) = (330.0, 260.0);
+
+/// Returns the position of a part of the largest speed on the colour scale. Equal steps of colour
+/// are equal steps of the root of the speed: slow grains differ too.
+fn shade(part: f64) -> f64 {
+    1.0 - part.sqrt()
+}
 
 /// Film of the grains from the side.
 pub struct SideFilm<'a> {
@@ -96,11 +102,7 @@ impl View for SideFilm<'_> {
         frame.clip(&mut drawing, "clip-0");
         for (grain, row) in rows {
             let speed = run.grains[grain].velocity[row].length();
-            let colour = hex(sequential(1.0 - (speed / self.fastest).sqrt()));
-            let style = format!(
-                "fill=\"{colour}\" stroke=\"#ffffff\" stroke-width=\"0.35\" \
-                 stroke-linejoin=\"round\""
-            );
+            let style = grain_style(shade(speed / self.fastest));
             let outlines = self.scene.outlines(grain, row, across, up);
             drawing.path(&frame.paths(&outlines), &style);
         }
@@ -108,9 +110,7 @@ impl View for SideFilm<'_> {
         let (unit, _) = length_unit(window.width().max(window.height()));
         let names = [across, up].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));
         frame.frame(&mut drawing, (Some(&names[0]), Some(&names[1])));
-        // Equal steps of colour are equal steps of the root of the speed: slow grains differ too.
-        let palette: Vec<[u8; 3]> =
-            (0..256).map(|i| sequential(1.0 - (f64::from(i) / 255.0).sqrt())).collect();
+        let palette = palette(shade);
         let axis = Axis::linear("speed  [m/s]", 0.0, self.fastest, 4, AxisRange::Tight);
         let corner = (0.5 * total - 90.0, MARGIN.1 + height + 30.0);
         colour_bar(&mut drawing, corner, 180.0, &palette, &axis, (false, false));

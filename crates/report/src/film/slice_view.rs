@@ -2,6 +2,7 @@
 
 use grainwake_plot::Drawing;
 use grainwake_plot::axis::{Axis, AxisRange};
+use grainwake_plot::equal_aspect::Window;
 
 use super::{View, moments};
 use crate::features::{RunKind, short};
@@ -21,7 +22,7 @@ pub struct SliceFilm<'a> {
     /// Slices of each picture, one per plane.
     files: Vec<Vec<&'a FrameFile>>,
     /// Displayed ranges of each picture.
-    windows: Vec<Vec<grainwake_plot::equal_aspect::Window>>,
+    windows: Vec<Vec<Window>>,
     style: Style,
     /// Largest speed in any slice [m/s].
     largest: f64,
@@ -52,14 +53,8 @@ impl<'a> SliceFilm<'a> {
                 match scene.run.slice(frame).and_then(|image| Section::of(&image, scene.vertical()))
                 {
                     Ok(section) if section.velocity.is_some() => read.push(section),
-                    Ok(_) => notes.push(format!(
-                        "{} was left out: it has no velocity",
-                        scene.run.short_name(&frame.file)
-                    )),
-                    Err(what) => notes.push(format!(
-                        "{} was left out: {what}",
-                        scene.run.short_name(&frame.file)
-                    )),
+                    Ok(_) => notes.push(scene.run.left_out(frame, "it has no velocity")),
+                    Err(what) => notes.push(scene.run.left_out(frame, &what)),
                 }
             }
             if read.len() < files.len() || read.is_empty() {
@@ -155,7 +150,7 @@ fn column(scene: &Scene, time: f64, section: &Section) -> Column {
 }
 
 /// Returns the largest speed in a window, outside the grains [m/s].
-fn largest_speed(section: &Section, window: grainwake_plot::equal_aspect::Window) -> f64 {
+fn largest_speed(section: &Section, window: Window) -> f64 {
     let Some(values) = Quantity::Speed.values(section) else {
         return 0.0;
     };

@@ -228,6 +228,11 @@ impl RunFolder {
         DVec3::new(inside(0), inside(1), inside(2))
     }
 
+    /// Returns the note about a file that is left out.
+    pub(crate) fn left_out(&self, frame: &FrameFile, what: &str) -> String {
+        format!("{} was left out: {what}", self.short_name(&frame.file))
+    }
+
     fn collection(&mut self) -> BTreeMap<String, f64> {
         let file = self.path.join("run.pvd");
         let entries = if file.is_file() { pvd::read(&file) } else { Ok(Vec::new()) };

@@ -111,7 +111,7 @@ impl Case {
             title: validated.resolved.title.clone(),
             setup: validated.setup,
             plan: validated.plan,
-            threads: validated.threads,
+            threads: validated.resolved.run.threads.value,
             expect: validated.expect,
             resolved,
             shapes: validated.shapes,

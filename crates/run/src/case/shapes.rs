@@ -93,27 +93,29 @@ impl<'a> Library<'a> {
         // Positions in the case file are no part of the shape.
         let text = toml::to_string(raw);
         let text = text.map_err(|error| (error.to_string(), "change the shape".to_owned()))?;
-        let key = format!("{text} {nodes}");
-        if let Some(shape) = self.built.get(&key) {
-            return Ok(shape.clone());
-        }
-        let shape = Arc::new(build(raw, nodes)?);
-        self.built.insert(key, shape.clone());
-        Ok(shape)
+        self.built(format!("{text} {nodes}"), || build(raw, nodes))
     }
 
     /// Returns `shape` rescaled to an equivalent diameter [m].
     pub fn rescaled(&mut self, shape: &Arc<Shape>, diameter: f64) -> Result<Arc<Shape>, Refusal> {
-        let key = format!("{:p} {diameter:?}", Arc::as_ptr(shape));
+        self.built(format!("{:p} {diameter:?}", Arc::as_ptr(shape)), || {
+            let scaled = shape.scaled_to_equivalent_diameter(diameter);
+            scaled.map_err(|error| (error.to_string(), "give a positive length".to_string()))
+        })
+    }
+
+    /// Returns the shape of this key; the first time it is built.
+    fn built(
+        &mut self,
+        key: String,
+        build: impl FnOnce() -> Result<Shape, Refusal>,
+    ) -> Result<Arc<Shape>, Refusal> {
         if let Some(shape) = self.built.get(&key) {
             return Ok(shape.clone());
         }
-        let scaled = shape.scaled_to_equivalent_diameter(diameter);
-        let scaled = Arc::new(
-            scaled.map_err(|error| (error.to_string(), "give a positive length".to_string()))?,
-        );
-        self.built.insert(key, scaled.clone());
-        Ok(scaled)
+        let shape = Arc::new(build()?);
+        self.built.insert(key, shape.clone());
+        Ok(shape)
     }
 }
 

@@ -82,10 +82,7 @@ impl PairMeasures {
     pub fn from_run(run: &RunFolder) -> Option<PairMeasures> {
         let features = RunFeatures::of(run);
         let [trailing, leading] = features.pair.filter(|_| run.displaced().len() == 2)?;
-        let oblong = [trailing, leading].iter().all(|g| {
-            let facts = run.facts.grains.get(*g);
-            facts.is_none_or(|f| f.shape.as_deref() != Some("sphere"))
-        });
+        let oblong = [trailing, leading].iter().all(|g| !run.facts.is_sphere(*g));
         let scales = features.scales?;
         let mut measures = PairMeasures::from_history(&PairHistory {
             grains: [&run.grains[trailing], &run.grains[leading]],

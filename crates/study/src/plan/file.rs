@@ -23,7 +23,8 @@ pub struct Study {
     pub ensemble: Option<Ensemble>,
     /// Requested analysis.
     pub analysis: Analysis,
-    source: Source,
+    /// Text of the study file.
+    pub(crate) source: Source,
 }
 
 /// Repetitions of models with small changes of the initial position and orientation of one grain.
@@ -79,27 +80,6 @@ impl Study {
             source,
         })
     }
-
-    /// Returns a problem of the study file with its remedy and location.
-    pub(crate) fn problem(
-        &self,
-        message: String,
-        help: &str,
-        span: Option<&Range<usize>>,
-        label: &str,
-    ) -> Problem {
-        self.source.problem(message, help, span, label)
-    }
-
-    /// Adds the location in the study file to a problem.
-    pub(crate) fn locate(
-        &self,
-        problem: Problem,
-        span: Option<&Range<usize>>,
-        label: &str,
-    ) -> Problem {
-        self.source.locate(problem, span, label)
-    }
 }
 
 fn read_analysis(
@@ -132,12 +112,12 @@ fn read_ensemble(
     models: &[Model],
 ) -> Result<Ensemble, StudyError> {
     let offset = raw.offset.as_ref().map(|offset| {
-        positive(source, offset, parse_length, "an offset must be a positive length")
-            .map_err(|problem| problem.help("for example offset = \"0.02 mm\""))
+        let expected = "an offset must be a positive length";
+        positive(source, offset, parse_length, expected, "for example offset = \"0.02 mm\"")
     });
     let turn = raw.turn.as_ref().map(|turn| {
-        positive(source, turn, parse_angle, "a turn must be a positive angle")
-            .map_err(|problem| problem.help("for example turn = \"2 deg\""))
+        let expected = "a turn must be a positive angle";
+        positive(source, turn, parse_angle, expected, "for example turn = \"2 deg\"")
     });
     let refuse = |message: &str, help: &str| {
         Err(source.problem(message, help, raw.members.span.as_ref(), "here").into())
@@ -178,15 +158,16 @@ fn positive(
     given: &Located<Size>,
     parse: fn(&str) -> Result<f64, String>,
     expected: &str,
+    help: &str,
 ) -> Result<f64, Problem> {
     let value = match &given.value {
         Size::Number(value) => Ok(*value),
         Size::Text(text) => parse(text),
     };
-    value
-        .and_then(|value| match value.is_finite() && value > 0.0 {
-            true => Ok(value),
-            false => Err(expected.into()),
-        })
-        .map_err(|message| source.locate(Problem::new(message), given.span.as_ref(), "here"))
+    let refused = |message: String| source.problem(message, help, given.span.as_ref(), "here");
+    match value {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        Ok(_) => Err(refused(expected.into())),
+        Err(message) => Err(refused(message)),
+    }
 }

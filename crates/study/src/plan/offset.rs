@@ -24,7 +24,7 @@ pub(crate) fn member_overrides(
     let grains = &case.setup.grains;
     let index = ensemble.grain.unwrap_or(grains.len().saturating_sub(1));
     let refuse = |message: String, help: &str| {
-        Err(study.problem(message, help, ensemble.span.as_ref(), "this ensemble").into())
+        Err(study.source.problem(message, help, ensemble.span.as_ref(), "this ensemble").into())
     };
     let Some(grain) = grains.get(index) else {
         let (name, count) = (&model.name, grains.len());

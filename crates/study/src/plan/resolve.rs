@@ -45,7 +45,7 @@ fn check_names(study: &Study, runs: &[Run]) -> Result<(), StudyError> {
             });
             let message = format!("{first} and {second} are both called \"{}\"", run.name);
             let help = "members are called MODEL-m1, MODEL-m2 ...: choose another name";
-            return Err(study.problem(message, help, None, "").into());
+            return Err(study.source.problem(message, help, None, "").into());
         }
     }
     Ok(())
@@ -159,7 +159,7 @@ fn locate_in_ensemble(
     let moved = problems.into_iter().map(|problem| {
         let message = format!("member {member} of \"{}\": {}", model.name, problem.message);
         let help = "the ensemble changes the start of a grain: reduce offset, turn or cell_shift";
-        study.problem(message, help, ensemble.span.as_ref(), "this ensemble")
+        study.source.problem(message, help, ensemble.span.as_ref(), "this ensemble")
     });
     StudyError::Invalid(moved.collect())
 }
@@ -184,7 +184,7 @@ fn locate_in_study(study: &Study, model: &Model, error: CaseError) -> StudyError
             Some(setting) => {
                 let mut moved = Problem::new(message).key(key);
                 moved.help = problem.help.take();
-                study.locate(moved, setting.span.as_ref(), "set here")
+                study.source.locate(moved, setting.span.as_ref(), "set here")
             }
             None => {
                 problem.message = message;

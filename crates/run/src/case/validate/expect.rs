@@ -12,49 +12,45 @@ pub(super) fn expectations(
     raw: &RawExpect,
     grains: usize,
 ) -> Vec<Expectation> {
-    let all = Vec::new();
-    let mut collector = Collector { check, grains, all };
-    collector.collect(&raw.peak_settling_speed, Measure::PeakSettlingSpeed);
-    collector.collect(&raw.kiss_time, Measure::KissTime);
-    collector.collect(&raw.tumble_time, Measure::TumbleTime);
-    collector.collect(&raw.separation_time, Measure::SeparationTime);
-    collector.collect(&raw.landing_time, Measure::LandingTime);
-    collector.collect(&raw.role_changes, Measure::RoleChanges);
-    collector.collect(&raw.end_time, Measure::EndTime);
-    collector.collect(&raw.max_divergence, Measure::MaxDivergence);
-    collector.all
+    [
+        expected(check, &raw.peak_settling_speed, Measure::PeakSettlingSpeed, grains),
+        expected(check, &raw.kiss_time, Measure::KissTime, grains),
+        expected(check, &raw.tumble_time, Measure::TumbleTime, grains),
+        expected(check, &raw.separation_time, Measure::SeparationTime, grains),
+        expected(check, &raw.landing_time, Measure::LandingTime, grains),
+        expected(check, &raw.role_changes, Measure::RoleChanges, grains),
+        expected(check, &raw.end_time, Measure::EndTime, grains),
+        expected(check, &raw.max_divergence, Measure::MaxDivergence, grains),
+    ]
+    .concat()
 }
 
-struct Collector<'a, 'b> {
-    check: &'a mut Checker<'b>,
+fn expected<K: Kind>(
+    check: &mut Checker,
+    raw: &OneOrMany<K>,
+    measure: Measure,
     grains: usize,
-    all: Vec<Expectation>,
-}
-
-impl Collector<'_, '_> {
-    fn collect<K: Kind>(&mut self, raw: &OneOrMany<K>, measure: Measure) {
-        let key = format!("expect.{measure}");
-        if !raw.is_empty() && measure.of_pair() && self.grains != 2 {
-            let grains = self.grains;
-            let message = format!("this is a result of a pair, but there are {grains} grains");
-            self.check.fail_key(&key, message, "leave it out, or use two grains");
-        }
-        for item in &raw.0 {
-            match bounds(item, self.grains) {
-                Ok((low, high)) => self.all.push(Expectation {
-                    measure,
-                    grain: item.grain.as_ref().map(|grain| grain.value),
-                    reference: item.value.value.as_ref().map(|value| value.si),
-                    low,
-                    high,
-                }),
-                Err((span, message, help)) if span.is_some() => {
-                    self.check.fail(span, message, help);
-                }
-                Err((_, message, help)) => self.check.fail_key(&key, message, help),
-            }
+) -> Vec<Expectation> {
+    let key = format!("expect.{measure}");
+    if !raw.is_empty() && measure.of_pair() && grains != 2 {
+        let message = format!("this is a result of a pair, but there are {grains} grains");
+        check.fail_key(&key, message, "leave it out, or use two grains");
+    }
+    let mut all = Vec::new();
+    for item in &raw.0 {
+        match bounds(item, grains) {
+            Ok((low, high)) => all.push(Expectation {
+                measure,
+                grain: item.grain.as_ref().map(|grain| grain.value),
+                reference: item.value.value.as_ref().map(|value| value.si),
+                low,
+                high,
+            }),
+            Err((span, message, help)) if span.is_some() => check.fail(span, message, help),
+            Err((_, message, help)) => check.fail_key(&key, message, help),
         }
     }
+    all
 }
 
 /// Position, message and help of a problem.

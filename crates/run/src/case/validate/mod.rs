@@ -33,7 +33,6 @@ use grainwake_solver::sim::{PrescribedMotion, Prescription, Setup};
 pub(super) struct Validated {
     pub setup: Setup,
     pub plan: RunPlan,
-    pub threads: usize,
     pub expect: Vec<Expectation>,
     pub shapes: Vec<ShapeFile>,
     /// Case with all defaults written out.
@@ -66,7 +65,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let mesh = domain::mesh(check, &mut raw.domain.value, dry);
     let boundaries = mesh.and_then(|mesh| domain::boundaries(check, &raw.domain, &mesh, dry));
     let gravity = raw.gravity.si;
-    let threads = plan::threads(check, &raw.run);
+    plan::check_threads(check, &raw.run);
 
     let mut grains = Grains::new(Library::new(folder), Vertical::of(gravity));
     let fluid_density = fluid.map(|fluid| fluid.density);
@@ -153,6 +152,5 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     raw.packing = Vec::new();
     raw.poses = Vec::new();
     raw.output.planes = Some(plan.planes.iter().map(|p| RawPlane::from(p).into()).collect());
-    raw.run.threads = threads.into();
-    Some(Validated { setup, plan, threads, expect, shapes: library.into_files(), resolved: raw })
+    Some(Validated { setup, plan, expect, shapes: library.into_files(), resolved: raw })
 }

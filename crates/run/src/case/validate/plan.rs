@@ -196,12 +196,10 @@ fn plane(
     Some(Plane { axis, position })
 }
 
-/// Returns the number of threads; 0 for all cores.
-pub(super) fn threads(check: &mut Checker, raw: &RawRun) -> usize {
-    let threads = raw.threads.value;
-    if threads > 4096 {
-        let message = format!("{threads} threads");
-        check.fail(&raw.threads.span, message, "0 takes all cores");
+/// Refuses absurd numbers of threads.
+pub(super) fn check_threads(check: &mut Checker, raw: &RawRun) {
+    let threads = &raw.threads;
+    if threads.value > 4096 {
+        check.fail(&threads.span, format!("{} threads", threads.value), "0 takes all cores");
     }
-    threads
 }
