@@ -124,15 +124,9 @@ impl Drawing {
         self.label(at, anchor, style::TEXT, style::INK, label);
     }
 
-    /// Adds a small label that runs upwards and ends at `(x, y)` [pt], horizontally centred.
-    pub fn upward_note(&mut self, (x, y): (f64, f64), label: &str) {
-        let base = (x + 0.36 * style::SMALL, y);
-        self.turned_label(base, Anchor::End, style::SMALL, style::INK, label);
-    }
-
     /// Adds a label of text size that runs upwards; the middle of its baseline is at `(x, y)` [pt].
     pub fn upward_text(&mut self, at: (f64, f64), label: &str) {
-        self.upward_label(at, style::TEXT, style::INK, label);
+        self.upward_label(at, Anchor::Middle, style::TEXT, style::INK, label);
     }
 
     /// Adds a small label, vertically centred at `(x, y)` [pt].
@@ -147,12 +141,8 @@ impl Drawing {
         self.styled_label(at, anchor, size, &style, label);
     }
 
-    /// Adds a label that runs upwards, with the middle of its baseline at `(x, y)` [pt].
-    pub fn upward_label(&mut self, at: (f64, f64), size: f64, colour: &str, label: &str) {
-        self.turned_label(at, Anchor::Middle, size, colour, label);
-    }
-
-    fn turned_label(
+    /// Adds a label that runs upwards, with its baseline at `(x, y)` [pt].
+    pub fn upward_label(
         &mut self,
         (x, y): (f64, f64),
         anchor: Anchor,

@@ -52,7 +52,8 @@ pub fn horizontal(
         drawing.line(&[(x, bottom), (x, bottom + TICK)], INK, HAIR, None);
         if labelled && upwards {
             if i % every == 0 {
-                drawing.upward_note((x, bottom + TICK + 2.0), name);
+                let base = (x + 0.36 * SMALL, bottom + TICK + 2.0);
+                drawing.upward_label(base, Anchor::End, SMALL, INK, name);
             }
         } else if labelled {
             let y = bottom + TICK + SMALL + 0.5;

@@ -21,7 +21,6 @@ pub mod run_folder;
 mod testing;
 pub mod thumbnail;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
@@ -32,7 +31,7 @@ use grainwake_plot::Figure;
 
 use error::Written as _;
 use features::RunFeatures;
-use figure::GrainSurface;
+use figure::{GrainSurface, Surfaces};
 use run_folder::RunFolder;
 
 /// Files of a report.
@@ -74,9 +73,7 @@ pub fn read_report(run_dir: &Path) -> Result<RunReport, ReportError> {
 }
 
 /// Reads a run folder with the surfaces of its grains, by index, and its notes.
-fn read_with_surfaces(
-    run_dir: &Path,
-) -> Result<(RunFolder, BTreeMap<usize, GrainSurface>, Vec<String>), ReportError> {
+fn read_with_surfaces(run_dir: &Path) -> Result<(RunFolder, Surfaces, Vec<String>), ReportError> {
     let mut run = RunFolder::open(run_dir)?;
     let mut notes = std::mem::take(&mut run.notes);
     let surfaces = figure::surfaces(&run, &mut notes);

@@ -14,6 +14,9 @@ use crate::run_folder::{History, RunFolder};
 /// Closed polygon in two of the three coordinates [m].
 pub type Outline = Vec<(f64, f64)>;
 
+/// Known surfaces of the grains in the body frame, by index of the grain.
+pub type Surfaces = BTreeMap<usize, GrainSurface>;
+
 /// Edge of a surface: two points, the lower index first.
 type Edge = (usize, usize);
 
@@ -166,8 +169,8 @@ fn take(next: &mut BTreeMap<Edge, Vec<Edge>>, edge: Edge) -> Option<Edge> {
 
 /// Reads the surface of each grain from its first surface file; unusable files are added to
 /// `notes`.
-pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> BTreeMap<usize, GrainSurface> {
-    let mut out = BTreeMap::new();
+pub fn surfaces(run: &RunFolder, notes: &mut Vec<String>) -> Surfaces {
+    let mut out = Surfaces::new();
     for frame in &run.surfaces {
         let known = match frame.grain {
             Some(grain) => out.contains_key(&grain),
@@ -190,7 +193,7 @@ fn add_surfaces(
     grain_of_file: Option<usize>,
     time: f64,
     histories: &[History],
-    out: &mut BTreeMap<usize, GrainSurface>,
+    out: &mut Surfaces,
 ) {
     let only = (histories.len() == 1).then_some(0);
     let mut parts: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();

@@ -13,22 +13,20 @@ pub(crate) mod slice_outlines;
 pub(crate) mod slices;
 mod trajectory;
 
-use std::collections::BTreeMap;
-
 use grainwake_plot::Figure;
 
 use crate::features::{RunFeatures, RunKind};
 use crate::phases;
 use crate::run_folder::RunFolder;
 
-pub use grain_surface::{GrainSurface, surfaces};
+pub use grain_surface::{GrainSurface, Surfaces, surfaces};
 pub(crate) use scene::Scene;
 
 /// Draws all figures that the run has data for; omissions are added to `notes`.
 pub fn all(
     run: &RunFolder,
     features: &RunFeatures,
-    surfaces: BTreeMap<usize, GrainSurface>,
+    surfaces: Surfaces,
     notes: &mut Vec<String>,
 ) -> Vec<Figure> {
     let scene = Scene {

@@ -1,7 +1,5 @@
 //! Data of the figures of a run, and the elements that several figures share.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 use grainwake_formats::events::Event;
 use grainwake_plot::Figure;
@@ -9,7 +7,7 @@ use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
 use grainwake_plot::style::series_colour;
 
-use super::grain_surface::{self, GrainSurface, Outline};
+use super::grain_surface::{self, Outline, Surfaces};
 use super::section::SliceView;
 use crate::features::RunFeatures;
 use crate::phases::Instant;
@@ -28,7 +26,7 @@ pub struct Scene<'a> {
     /// Features derived from the tables.
     pub features: &'a RunFeatures,
     /// Known surfaces of the grains, in the body frame.
-    pub surfaces: BTreeMap<usize, GrainSurface>,
+    pub surfaces: Surfaces,
     /// Key instants, moved to the nearest times with pictures.
     pub instants: Vec<Instant>,
 }

@@ -226,7 +226,7 @@ pub fn draw(
     }
     for (r, (name, colour)) in rows.iter().enumerate() {
         let middle = (9.0, row_top(r) + 0.5 * height);
-        drawing.upward_label(middle, SMALL, colour, name);
+        drawing.upward_label(middle, Anchor::Middle, SMALL, colour, name);
     }
     let length = 180.0_f64.min(total - 40.0);
     let corner = (0.5 * (total - length), bottom + 28.0);

@@ -19,6 +19,11 @@ pub struct Located<T> {
     pub span: Span,
 }
 
+/// Returns whether a value is the default, which a resolved case leaves out.
+pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 impl<T> Located<T> {
     /// Returns a value of the program at the position of a value of the file.
     pub const fn at(value: T, span: Span) -> Located<T> {

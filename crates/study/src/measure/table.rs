@@ -9,7 +9,7 @@ use super::record::RunRecord;
 use super::settling::GrainSettling;
 use crate::error::{At, StudyError, read_rows, write_file, write_json};
 use crate::format::rounded;
-use crate::plan::quantities::{PAIR_QUANTITIES, SETTLING_QUANTITIES};
+use crate::plan::quantities::{FIRST_COLUMNS, LAST_COLUMNS, PAIR_QUANTITIES, SETTLING_QUANTITIES};
 use crate::plan::{EARLIER_TABLE, TABLE};
 
 /// Table of the grains of all runs that are not pairs, in the study folder.
@@ -108,14 +108,10 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
     let factors: BTreeSet<&String> = records.iter().flat_map(|r| r.factors.keys()).collect();
     let quantities = columns(records);
     let pairs = quantities.contains(&"kiss_time");
-    let kiss = pairs.then_some("kiss_time_s");
-    let mut header: Vec<&str> = vec!["run", "model", "member", "state"];
+    let mut header = FIRST_COLUMNS.to_vec();
     header.extend(axes.iter().chain(&factors).map(|name| name.as_str()));
     header.extend(&quantities);
-    header.push("diameter_m");
-    header.extend(kiss);
-    header.extend(["steps", "end_time_s", "wall_s", "threads"]);
-    header.extend(["max_divergence", "id", "remark"]);
+    header.extend(LAST_COLUMNS.split(',').filter(|name| pairs || *name != "kiss_time_s"));
     let row = |r: &RunRecord| {
         let member = r.member.to_string();
         let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.to_string()];
@@ -123,7 +119,7 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
         cells.extend(factors.iter().map(|f| text(r.factors.get(*f), f64::to_string)));
         cells.extend(quantities.iter().map(|q| number(r.measured(q))));
         cells.push(text(r.diameter_m, |v| format!("{v:e}")));
-        cells.extend(kiss.map(|_| number(r.kiss_time_s)));
+        cells.extend(pairs.then(|| number(r.kiss_time_s)));
         cells.push(text(r.steps, |v| v.to_string()));
         cells.push(number(r.end_time_s));
         cells.push(text(r.wall_s, |v| format!("{v:.1}")));

@@ -8,7 +8,7 @@ use grainwake_run::case::{Located, Problem, Source, did_you_mean};
 use toml::Value;
 
 use super::quantities::is_column;
-use super::raw::{Keys, RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
+use super::raw::{RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
 
 /// Largest number of runs of a study.
 pub(crate) const MOST_RUNS: usize = 100_000;
@@ -283,11 +283,7 @@ fn inline(value: &Value) -> String {
 
 /// Combines a model with every value of an axis.
 fn cross(model: &Model, axis: &RawAxis) -> Vec<Model> {
-    let keys: &[String] = match axis.key.as_ref().map(|k| &k.value) {
-        None => &[],
-        Some(Keys::One(key)) => std::slice::from_ref(key),
-        Some(Keys::Several(keys)) => keys,
-    };
+    let keys = axis.key.as_ref().map_or(&[][..], |key| key.value.list());
     let at = |value: &RawValue| {
         let mut model = model.clone();
         if !model.name.is_empty() {

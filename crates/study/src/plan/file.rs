@@ -8,7 +8,7 @@ use grainwake_run::case::{Located, Problem, Source, parse_angle, parse_length};
 
 use super::claims::Analysis;
 use super::expand::{self, Model};
-use super::raw::{Files, RawEnsemble, RawStudy, Size};
+use super::raw::{OneOrSeveral, RawEnsemble, RawStudy, Size};
 use crate::error::{At, StudyError, refer_to_study_keys};
 
 /// A study: its models, repetitions and requested analysis.
@@ -84,16 +84,12 @@ impl Study {
 
 fn read_analysis(
     source: &Source,
-    given: &Located<Files>,
+    given: &Located<OneOrSeveral<PathBuf>>,
     folder: &Path,
     models: &[Model],
 ) -> Result<Analysis, StudyError> {
-    let files = match &given.value {
-        Files::One(file) => std::slice::from_ref(file),
-        Files::Several(files) => files,
-    };
     let mut all = Analysis::default();
-    for file in files {
+    for file in given.value.list() {
         let path = folder.join(file);
         let text = read_text(&path, SETTINGS).map_err(|error| {
             let message = format!("cannot read {}: {error}", path.display());

@@ -50,26 +50,16 @@ pub const SETTLING_QUANTITIES: [&str; 16] = [
 /// Factors of every run: Krumbein sphericity and, if known, Wadell roundness of its first grain.
 pub const SHAPE_FACTORS: [&str; 2] = ["krumbein_sphericity", "wadell_roundness"];
 
-/// Columns of `table.csv` that are neither axes, factors nor quantities.
-pub const OTHER_COLUMNS: [&str; 13] = [
-    "run",
-    "model",
-    "member",
-    "state",
-    "diameter_m",
-    "kiss_time_s",
-    "steps",
-    "end_time_s",
-    "wall_s",
-    "threads",
-    "max_divergence",
-    "id",
-    "remark",
-];
+/// First columns of `table.csv`; axes, factors and quantities follow.
+pub const FIRST_COLUMNS: [&str; 4] = ["run", "model", "member", "state"];
+/// Last columns of `table.csv`.
+pub const LAST_COLUMNS: &str =
+    "diameter_m,kiss_time_s,steps,end_time_s,wall_s,threads,max_divergence,id,remark";
 
 /// Returns whether `table.csv` has a column of this name in some study.
 pub fn is_column(name: &str) -> bool {
     PAIR_QUANTITIES.contains(&name)
         || SETTLING_QUANTITIES.contains(&name)
-        || OTHER_COLUMNS.contains(&name)
+        || FIRST_COLUMNS.contains(&name)
+        || LAST_COLUMNS.split(',').any(|column| column == name)
 }

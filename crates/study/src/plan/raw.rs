@@ -27,29 +27,32 @@ pub(crate) struct RawStudy {
     #[serde(default)]
     pub adjust: Vec<RawAdjust>,
     pub ensemble: Option<RawEnsemble>,
-    pub analysis: Option<Located<Files>>,
+    pub analysis: Option<Located<OneOrSeveral<PathBuf>>>,
 }
 
+/// One value, or a list.
 #[derive(Clone, Deserialize)]
 #[serde(untagged)]
-pub(crate) enum Files {
-    One(PathBuf),
-    Several(Vec<PathBuf>),
+pub(crate) enum OneOrSeveral<T> {
+    One(T),
+    Several(Vec<T>),
+}
+
+impl<T> OneOrSeveral<T> {
+    pub fn list(&self) -> &[T] {
+        match self {
+            OneOrSeveral::One(value) => std::slice::from_ref(value),
+            OneOrSeveral::Several(values) => values,
+        }
+    }
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawAxis {
     pub name: Located<String>,
-    pub key: Option<Located<Keys>>,
+    pub key: Option<Located<OneOrSeveral<String>>>,
     pub values: Located<Vec<RawValue>>,
-}
-
-#[derive(Clone, Deserialize)]
-#[serde(untagged)]
-pub(crate) enum Keys {
-    One(String),
-    Several(Vec<String>),
 }
 
 #[derive(Deserialize)]

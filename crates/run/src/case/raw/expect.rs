@@ -3,7 +3,7 @@
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize, Serializer};
 
-use crate::case::located::Located;
+use crate::case::located::{Located, is_default};
 use crate::case::notation::{Notation, Unsupported, notations};
 use crate::case::quantity::{Kind, Number, Quantity, Rate, Time, Velocity, parse_quantity};
 
@@ -12,36 +12,29 @@ use crate::case::quantity::{Kind, Number, Quantity, Rate, Time, Velocity, parse_
 #[serde(deny_unknown_fields, default)]
 pub struct RawExpect {
     /// Largest speed along gravity of a grain [m/s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub peak_settling_speed: OneOrMany<Velocity>,
     /// First contact of the pair [s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub kiss_time: OneOrMany<Time>,
     /// Start of the tumbling [s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub tumble_time: OneOrMany<Time>,
     /// Last separation of the pair [s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub separation_time: OneOrMany<Time>,
     /// First contact of a grain with the floor [s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub landing_time: OneOrMany<Time>,
     /// Number of role changes of the pair.
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub role_changes: OneOrMany<Number>,
     /// Simulated time at the end [s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub end_time: OneOrMany<Time>,
     /// Largest |div u| after any step [1/s].
-    #[serde(skip_serializing_if = "OneOrMany::is_empty")]
+    #[serde(skip_serializing_if = "is_default")]
     pub max_divergence: OneOrMany<Rate>,
-}
-
-impl RawExpect {
-    /// Returns whether nothing is expected.
-    pub fn is_empty(&self) -> bool {
-        *self == RawExpect::default()
-    }
 }
 
 /// One expected result: `value` with `tolerance`, or a bound.
@@ -104,13 +97,6 @@ impl<K> Serialize for Tolerance<K> {
 /// Expected values of one quantity: none, one or several.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OneOrMany<K: Kind>(pub Vec<Located<RawExpected<K>>>);
-
-impl<K: Kind> OneOrMany<K> {
-    /// Returns whether nothing is expected.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-}
 
 impl<K: Kind> Notation for OneOrMany<K> {
     const EXPECTED: &'static str =

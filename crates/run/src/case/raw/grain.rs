@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::RawMotion;
 use super::orientation::{Orientation, Turns};
-use crate::case::located::Located;
+use crate::case::located::{Located, is_default};
 use crate::case::notation::{Notation, Unsupported, notations, refusal};
 use crate::case::quantity::{
     AngularVelocity, Density, ElasticModulus, Length, Number, Quantity, Triple, Velocity,
@@ -43,7 +43,7 @@ pub struct RawGrain {
     #[serde(default)]
     pub orientation: Located<Orientation>,
     /// Turns applied after `orientation`, about axes of space: one `{ axis, angle }` or a list.
-    #[serde(default, skip_serializing_if = "Turns::is_empty")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub rotate: Turns,
     /// Velocity at the start [m/s].
     pub velocity: Option<Located<Triple<Velocity>>>,

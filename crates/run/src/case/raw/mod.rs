@@ -30,7 +30,7 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::located::Located;
+use super::located::{Located, is_default};
 use super::quantity::{Acceleration, Triple};
 
 /// A case: grains, fluid, box and what to write. Bare numbers are SI; strings carry units.
@@ -64,7 +64,7 @@ pub struct RawCase {
     #[serde(default)]
     pub run: RawRun,
     /// Expected results, which make the case a test.
-    #[serde(default, skip_serializing_if = "RawExpect::is_empty")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub expect: RawExpect,
     /// Points, lines and planes sampled over time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -56,13 +56,6 @@ impl Turn {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Turns(pub Vec<Turn>);
 
-impl Turns {
-    /// Returns whether there is no turn.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-}
-
 impl Notation for Turns {
     const EXPECTED: &'static str = "{ axis = \"y\", angle = \"45 deg\" } or a list of such turns";
     type List = Vec<Turn>;

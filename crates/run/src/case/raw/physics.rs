@@ -4,7 +4,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::formula::{OfPosition, OfTime, VectorOrFormula};
-use crate::case::located::Located;
+use crate::case::located::{Located, is_default};
 use crate::case::quantity::{
     Acceleration, Density, DynamicViscosity, ElasticModulus, KinematicViscosity, Length, Number,
     Quantity, Rate, Stiffness, Velocity,
@@ -57,17 +57,13 @@ pub struct RawCoupling {
     /// `impulsive` (a grain starts with its velocity, and the fluid around it is set in motion) or
     /// `released` (the grain loses the momentum that the fluid gains).
     // The default is not written, so that checkpoints of earlier versions still match their case.
-    #[serde(skip_serializing_if = "is_impulsive")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(schema_with = "start_schema")]
     pub start: Located<Start>,
 }
 
 fn scheme_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "enum": [Scheme::Aperture, Scheme::Paper] })
-}
-
-fn is_impulsive(start: &Located<Start>) -> bool {
-    start.value == Start::Impulsive
 }
 
 fn start_schema(_: &mut SchemaGenerator) -> Schema {
@@ -81,7 +77,7 @@ pub struct RawContact {
     /// `linear` (Eqs 9 and 14) or `hertz-mindlin` (Hertz normal force, no-slip Mindlin tangential
     /// force, material by grain).
     // The default is not written, so that checkpoints of earlier versions still match their case.
-    #[serde(skip_serializing_if = "is_linear")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(schema_with = "law_schema")]
     pub law: Located<ContactLawKind>,
     /// Normal stiffness k_n [N/m] (Eq. 9). Give either this or `maximum_overlap`.
@@ -134,10 +130,6 @@ pub struct RawContact {
     /// they begin in contact, with compressed springs. Without it they may not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accept_overlap: Option<Located<Quantity<Number>>>,
-}
-
-fn is_linear(law: &Located<ContactLawKind>) -> bool {
-    law.value == ContactLawKind::Linear
 }
 
 fn law_schema(_: &mut SchemaGenerator) -> Schema {

@@ -32,7 +32,7 @@ fn expected<K: Kind>(
     grains: usize,
 ) -> Vec<Expectation> {
     let key = format!("expect.{measure}");
-    if !raw.is_empty() && measure.of_pair() && grains != 2 {
+    if !raw.0.is_empty() && measure.of_pair() && grains != 2 {
         let message = format!("this is a result of a pair, but there are {grains} grains");
         check.fail_key(&key, message, "leave it out, or use two grains");
     }
