@@ -33,6 +33,10 @@ pub struct Axis {
 }
 
 impl Axis {
+    fn new(label: &str, scale: Scale, low: f64, high: f64, ticks: Vec<(f64, String)>) -> Axis {
+        Axis { label: label.to_owned(), scale, low, high, ticks }
+    }
+
     /// Creates a linear axis from `low` to `high` with about `count` round steps; a
     /// rounded range is extended towards whole steps.
     pub fn linear(label: &str, low: f64, high: f64, count: usize, range: AxisRange) -> Axis {
@@ -71,7 +75,7 @@ impl Axis {
             })
             .collect();
         let label = if power == 0 { label.to_owned() } else { scaled_label(label, power) };
-        Axis { label, scale: Scale::Linear, low, high, ticks }
+        Axis::new(&label, Scale::Linear, low, high, ticks)
     }
 
     /// Creates an axis for angles [deg], with ticks every 30 up to 90, every 45 up to 360 and every
@@ -86,13 +90,8 @@ impl Axis {
         let first = (low / step + 1e-6).floor() as i64;
         let last = (high / step - 1e-6).ceil() as i64;
         let value = |i: i64| i as f64 * step;
-        Axis {
-            label: label.to_owned(),
-            scale: Scale::Linear,
-            low: value(first),
-            high: value(last),
-            ticks: (first..=last).map(|i| (value(i), minus(&value(i).to_string()))).collect(),
-        }
+        let ticks = (first..=last).map(|i| (value(i), minus(&value(i).to_string()))).collect();
+        Axis::new(label, Scale::Linear, value(first), value(last), ticks)
     }
 
     /// Creates a logarithmic axis that covers `low` to `high` (positive) in whole decades.
@@ -113,13 +112,7 @@ impl Axis {
                 (10f64.powi(power), text)
             })
             .collect();
-        Axis {
-            label: label.to_owned(),
-            scale: Scale::Log,
-            low: 10f64.powi(first),
-            high: 10f64.powi(last),
-            ticks,
-        }
+        Axis::new(label, Scale::Log, 10f64.powi(first), 10f64.powi(last), ticks)
     }
 
     /// Creates a logarithmic axis that covers `low` to `high` (positive), extended to the next 1, 2
@@ -160,24 +153,15 @@ impl Axis {
             if shown { format!("{value:.digits$}") } else { String::new() }
         };
         let inner = marks(&all).into_iter().filter(inside);
-        Axis {
-            label: label.to_owned(),
-            scale: Scale::Log,
-            low,
-            high,
-            ticks: inner.map(|value| (value, text(value))).collect(),
-        }
+        let ticks = inner.map(|value| (value, text(value))).collect();
+        Axis::new(label, Scale::Log, low, high, ticks)
     }
 
     /// Creates an axis of categories at 0.5, 1.5 ..., with their names in label markup.
     pub fn categories(label: &str, names: Vec<String>) -> Axis {
-        Axis {
-            label: label.to_owned(),
-            scale: Scale::Categories,
-            low: 0.0,
-            high: names.len().max(1) as f64,
-            ticks: names.into_iter().enumerate().map(|(i, name)| (i as f64 + 0.5, name)).collect(),
-        }
+        let high = names.len().max(1) as f64;
+        let ticks = names.into_iter().enumerate().map(|(i, name)| (i as f64 + 0.5, name)).collect();
+        Axis::new(label, Scale::Categories, 0.0, high, ticks)
     }
 
     /// Returns whether the ticks are categories.

@@ -106,6 +106,15 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// Returns the refusal of a folder that holds other data.
+    pub(crate) fn occupied(
+        folder: &Path,
+        what: impl std::fmt::Display,
+        remedy: impl Into<String>,
+    ) -> RunError {
+        RunError::Occupied { what: format!("{} {what}", folder.display()), remedy: remedy.into() }
+    }
+
     /// Returns the kind of the failure.
     pub fn kind(&self) -> FailureKind {
         match self {

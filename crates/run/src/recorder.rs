@@ -106,18 +106,23 @@ impl Recorder {
         recorder.series.iter_mut().for_each(|series| series.start_after(sim.time()));
         let events = recorder.events();
         recorder.tables.append_events(&events)?;
-        recorder.write_start(sim)?;
+        recorder.write_series(sim, |series| series.is_on().then(|| "start".to_owned()))?;
         recorder.checkpoint(sim)?;
         Ok(recorder)
     }
 
-    /// Writes the state that a run starts from, in every series.
-    fn write_start(&mut self, sim: &Simulation) -> Result<(), RunError> {
+    /// Writes an output of each series for which `tag` returns the end of the file names.
+    fn write_series(
+        &mut self,
+        sim: &Simulation,
+        tag: impl Fn(&mut Series) -> Option<String>,
+    ) -> Result<(), RunError> {
         let mut files = Vec::new();
         for index in 0..self.series.len() {
-            let Series { content, .. } = self.series[index];
-            if self.series[index].is_on() {
-                files.extend(self.write(content, sim, "start")?);
+            let series = &mut self.series[index];
+            let content = series.content;
+            if let Some(tag) = tag(series) {
+                files.extend(self.write(content, sim, &tag)?);
             }
         }
         if files.is_empty() { Ok(()) } else { self.add(files) }
@@ -195,17 +200,11 @@ impl Recorder {
     }
 
     fn write_due(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        let mut files = Vec::new();
-        for index in 0..self.series.len() {
-            let series = &mut self.series[index];
-            if !series.is_due(sim.time()) {
-                continue;
-            }
-            let (content, tag) = (series.content, format!("{:06}", series.next));
-            series.next += 1;
-            files.extend(self.write(content, sim, &tag)?);
-        }
-        if files.is_empty() { Ok(()) } else { self.add(files) }
+        self.write_series(sim, |series| {
+            let tag = series.is_due(sim.time()).then(|| format!("{:06}", series.next));
+            series.next += u64::from(tag.is_some());
+            tag
+        })
     }
 
     /// Writes one output and returns its VTK files; `tag` ends their names.

@@ -214,9 +214,8 @@ impl Recording {
         crate::memory::admit_memory(&job.setup)?;
         let opened = Opened::new(job, out, options)?;
         if opened.finished(job, note)?.is_some() {
-            let what = format!("{} holds a finished run", out.display());
-            let remedy = "give another folder or a later end, or replace it (force)".to_owned();
-            return Err(RunError::Occupied { what, remedy });
+            let remedy = "give another folder or a later end, or replace it (force)";
+            return Err(RunError::occupied(out, "holds a finished run", remedy));
         }
         let mut sim = Simulation::new(job.setup.clone())?;
         let recording = opened.begin(job, options, &mut sim, note)?;

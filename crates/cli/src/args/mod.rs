@@ -1,25 +1,18 @@
-//! Arguments of the command line; a command with many of them has a module.
+//! Arguments of the command line; those of `grain` have a module.
 
-mod bench;
 mod grain;
-mod run;
-mod study;
-mod validate;
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
 use grainwake_run::provenance;
+use grainwake_solver::math::{InstructionSet, Precision};
 
-pub use bench::BenchArgs;
 pub use grain::{
     Body, CompareArgs, ExportArgs, FamilyArgs, FromMeshArgs, FromScanArgs, GrainCommand, InfoArgs,
     NewGrain,
 };
-pub use run::{CheckArgs, RunArgs};
-pub use study::StudyArgs;
-pub use validate::ValidateArgs;
 
 /// Version and commit, as in `provenance.json`.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -65,6 +58,183 @@ pub enum Command {
     },
     /// Print the manual page (roff)
     Man(ManArgs),
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Run folder [default: runs/NAME; for a case.resolved.toml its own folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Number of threads, 0 for all cores, at most 4 per core [default: value of the case]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Continue from the last checkpoint
+    #[arg(long, conflicts_with = "force")]
+    pub resume: bool,
+    /// Continue from the last checkpoint, or start if the folder holds no run (for job scripts)
+    #[arg(long, conflicts_with_all = ["force", "resume"])]
+    pub resume_or_start: bool,
+    /// Replace an existing run
+    #[arg(long)]
+    pub force: bool,
+    /// Start from a checkpoint of another run: the newest, or the newest at or before TIME, for
+    /// example runs/heap@0.5
+    #[arg(long, value_name = "DIR[@TIME]", conflicts_with = "resume")]
+    pub from: Option<String>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// Do not draw the figures and report.html at the end of the run
+    #[arg(long)]
+    pub no_report: bool,
+    /// Print errors only; `check` prints the warnings of a case
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the summary as a JSON object; other messages go to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Case file
+    pub case: PathBuf,
+    /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// Print a JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// Study file
+    pub study: PathBuf,
+    /// Study folder [default: runs/NAME]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Number of concurrent runs
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub jobs: usize,
+    /// Number of threads of each run, 0 to share all cores among the jobs
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Select runs: names with * and ?, separated by commas, or the i-th of N equal shares
+    #[arg(long, value_name = "PATTERN|i/N")]
+    pub only: Option<String>,
+    /// List the runs and their states, without running any
+    #[arg(long)]
+    pub list: bool,
+    /// Print the planned work with its estimated time and memory, without running any
+    #[arg(long)]
+    pub dry_run: bool,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// Restart failed runs
+    #[arg(long)]
+    pub retry: bool,
+    /// Count finished runs by this commit of the program (12 digits), if its results are identical;
+    /// repeatable
+    #[arg(long, value_name = "COMMIT")]
+    pub accept: Vec<String>,
+    /// Keep the checkpoints of finished runs
+    #[arg(long)]
+    pub keep_checkpoints: bool,
+    /// Print the table, warnings and errors only
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the table (or the list) as JSON; other messages go to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `validate`.
+#[derive(Debug, Args)]
+pub struct ValidateArgs {
+    /// Validations, NAME or NAME/RUN [default: all]
+    pub names: Vec<String>,
+    /// Extent: ci for small runs, full for the published resolutions
+    #[arg(long, default_value = "ci", value_parser = ["ci", "full"])]
+    pub level: String,
+    /// Folder of the validations [default: `validation` if it holds any, otherwise those in the
+    /// program]
+    #[arg(long, value_name = "DIR")]
+    pub suites: Option<PathBuf>,
+    /// Folder of the runs
+    #[arg(short, long, value_name = "DIR", default_value = "runs/validation")]
+    pub output: PathBuf,
+    /// Add the results with their provenance to LEVEL.json and LEVEL.md in this folder, and draw
+    /// the figures
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["set", "unset"])]
+    pub save: Option<PathBuf>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// Keep finished runs of the same case and program version, resume interrupted ones
+    #[arg(long)]
+    pub resume: bool,
+    /// Evaluate the finished runs of any program version, without running any
+    #[arg(long, conflicts_with = "resume")]
+    pub judge: bool,
+    /// List the validations and their runs, without running any
+    #[arg(long)]
+    pub list: bool,
+    /// Number of threads, 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Print the table, warnings and errors only
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the results, or the list of --list, as JSON; other messages go to standard error
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Case file to measure, dry or with fluid, instead of grains in a box of water
+    #[arg(value_name = "CASE.toml", conflicts_with_all = ["size", "grains", "scheme", "precision",
+        "scaling"])]
+    pub case: Option<PathBuf>,
+    #[command(flatten)]
+    pub overrides: Overrides,
+    /// Number of cells along x, y and z
+    #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
+    pub size: Vec<usize>,
+    /// Number of grains, 8 cells across, evenly distributed
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub grains: usize,
+    /// Number of timed steps
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub steps: u64,
+    /// Number of untimed steps before
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub warm_up: u64,
+    /// Number of threads, 0 for all cores
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub threads: usize,
+    /// Coupling scheme
+    #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
+    pub scheme: String,
+    /// Floating-point type of the fields
+    #[arg(long, value_name = "f64|f32", default_value_t = Precision::Double)]
+    pub precision: Precision,
+    /// Instruction set; one that the processor lacks is an error [default: the widest it has]
+    #[arg(long, value_name = "baseline|avx2|avx512")]
+    pub instructions: Option<InstructionSet>,
+    /// Measure cubes of 32 to 256 cells along an edge instead, some with large prime factors
+    #[arg(long, conflicts_with = "size")]
+    pub scaling: bool,
+    /// Print a JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `report`.

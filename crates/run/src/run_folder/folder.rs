@@ -94,19 +94,11 @@ fn content(folder: &Path) -> Result<Content, RunError> {
 
 /// Checks that a run may use the folder; writes nothing.
 pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunError> {
+    let occupied = |what: &str, remedy: &str| Err(RunError::occupied(folder, what, remedy));
     if folder.exists() && !folder.is_dir() {
-        return Err(RunError::Occupied {
-            what: format!("{} is a file, not a folder", folder.display()),
-            remedy: "give the folder of the run with -o".into(),
-        });
+        return occupied("is a file, not a folder", "give the folder of the run with -o");
     }
     let present = content(folder)?;
-    let occupied = |what: &str, remedy: &str| {
-        Err(RunError::Occupied {
-            what: format!("{} {what}", folder.display()),
-            remedy: remedy.into(),
-        })
-    };
     match (present, existing) {
         (Content::Foreign, _) => {
             occupied("is not empty and holds no run of this program", "give another folder with -o")
@@ -132,10 +124,10 @@ pub(crate) fn admit_parent(folder: &Path, parent: Option<&Parent>) -> Result<(),
     let Some(parent) = parent else { return Ok(()) };
     let absolute = |path: &Path| std::fs::canonicalize(path).ok();
     match absolute(folder) {
-        path @ Some(_) if absolute(parent.folder()) == path => Err(RunError::Occupied {
-            what: format!("{} is the run to start from", folder.display()),
-            remedy: "give another folder with -o, or continue the run itself with --resume".into(),
-        }),
+        path @ Some(_) if absolute(parent.folder()) == path => {
+            let remedy = "give another folder with -o, or continue the run itself with --resume";
+            Err(RunError::occupied(folder, "is the run to start from", remedy))
+        }
         _ => Ok(()),
     }
 }
@@ -161,14 +153,14 @@ pub(crate) fn same_parent(
 /// Error of a run that was interrupted before it had saved the state it started from.
 pub(crate) fn start_lost(folder: &Path, parent: &ParentRun) -> RunError {
     let (time, from) = (parent.checkpoint_time, &parent.folder);
-    RunError::Occupied {
-        what: format!(
-            "{} holds a run that started from {from} at t = {} and has no checkpoint yet",
-            folder.display(),
-            quantity(time, "s")
-        ),
-        remedy: format!("start it again with --from \"{from}@{time}\" --force"),
-    }
+    let at = quantity(time, "s");
+    let what =
+        format!("holds a run that started from {from} at t = {at} and has no checkpoint yet");
+    RunError::occupied(
+        folder,
+        what,
+        format!("start it again with --from \"{from}@{time}\" --force"),
+    )
 }
 
 /// Creates the folder if absent, and locks it for this program.
