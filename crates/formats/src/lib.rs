@@ -34,3 +34,15 @@ mod vtk_xml;
 pub mod vtp;
 
 pub use error::{FormatError, read_text};
+
+/// Makes a type display the name that serde gives its value in files.
+#[macro_export]
+macro_rules! display_as_serialized {
+    ($type:ty) => {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                serde::Serialize::serialize(self, f)
+            }
+        }
+    };
+}

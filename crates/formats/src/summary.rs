@@ -1,6 +1,5 @@
 //! Results of a run (`summary.json`).
 
-use std::fmt;
 use std::io;
 use std::path::Path;
 
@@ -140,11 +139,7 @@ pub enum EndReason {
     Separation,
 }
 
-impl fmt::Display for EndReason {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.serialize(f)
-    }
-}
+crate::display_as_serialized!(EndReason);
 
 /// Results of a pair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,5 @@
 //! Comparison of the results of a run with `[expect]`.
 
-use std::fmt;
-
 use serde::Serialize;
 
 use grainwake_formats::summary::Summary;
@@ -28,11 +26,7 @@ impl Measure {
     }
 }
 
-impl fmt::Display for Measure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.serialize(f)
-    }
-}
+grainwake_formats::display_as_serialized!(Measure);
 
 /// One expected result.
 #[derive(Clone, Debug, PartialEq)]

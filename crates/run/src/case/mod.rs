@@ -123,13 +123,12 @@ impl Case {
 
     /// Returns the input of the run loop.
     pub fn job(&self) -> Job {
-        let files = self.shapes.iter();
         Job {
             setup: self.setup.clone(),
             plan: self.plan.clone(),
             resolved: self.resolved.clone(),
             digest: self.digest.clone(),
-            files: (files.map(|file| (file.name.clone(), file.bytes.clone()))).collect(),
+            files: self.shapes.clone(),
         }
     }
 
@@ -182,9 +181,9 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError>
     core.output.checkpoint_keep = None;
     let mut hash = Sha256::new();
     hash.update(write(&core)?);
-    for shape in shapes {
-        hash.update(shape.name.as_bytes());
-        hash.update(shape.bytes.as_slice());
+    for (name, bytes) in shapes {
+        hash.update(name.as_bytes());
+        hash.update(bytes.as_slice());
     }
     let bytes = hash.finalize();
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())

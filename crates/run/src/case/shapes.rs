@@ -14,16 +14,8 @@ use super::raw::{RawShape, ShapeKind};
 /// Default number of surface nodes of a closed form.
 pub(super) const DEFAULT_NODES: usize = 2000;
 
-/// `.grain` file of a case.
-#[derive(Clone, Debug)]
-pub struct ShapeFile {
-    /// Name in the run folder, "shapes/x.grain".
-    pub name: String,
-    /// Path it was read from.
-    pub source: PathBuf,
-    /// Contents of the file.
-    pub bytes: Arc<Vec<u8>>,
-}
+/// `.grain` file of a case: name in the run folder, "shapes/x.grain", and contents.
+pub type ShapeFile = (String, Arc<Vec<u8>>);
 
 /// Message and help of a shape that cannot be built.
 pub(super) type Refusal = (String, String);
@@ -55,7 +47,7 @@ impl<'a> Library<'a> {
     pub fn file(&mut self, name: &str) -> Result<(Arc<Shape>, String), Refusal> {
         let path = self.folder.join(name);
         if let Some((file, shape)) = self.files.get(&path) {
-            return Ok((shape.clone(), file.name.clone()));
+            return Ok((shape.clone(), file.0.clone()));
         }
         let limit = ReadLimits::default().file_bytes;
         let bytes = read_bytes(&path, limit).map_err(|error| match error.kind() {
@@ -66,7 +58,7 @@ impl<'a> Library<'a> {
             _ => (format!("cannot read {}: {error}", path.display()), "check the file and its permissions".to_string()),
         })?;
         // A copy of a file under another name has the same shape.
-        let copy = self.files.values().find(|(known, _)| *known.bytes == bytes);
+        let copy = self.files.values().find(|((_, known), _)| **known == bytes);
         let shape = match copy {
             Some((_, shape)) => shape.clone(),
             None => Arc::new(Shape::from_bytes(&bytes, &path).map_err(|error| {
@@ -76,15 +68,14 @@ impl<'a> Library<'a> {
         };
         let stem =
             path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
-        let taken = |candidate: &str| self.files.values().any(|(f, _)| f.name == candidate);
+        let taken = |candidate: &str| self.files.values().any(|((name, _), _)| name == candidate);
         let mut name = format!("shapes/{stem}.grain");
         let mut count = 1;
         while taken(&name) {
             count += 1;
             name = format!("shapes/{stem}-{count}.grain");
         }
-        let file = ShapeFile { name: name.clone(), source: path.clone(), bytes: Arc::new(bytes) };
-        self.files.insert(path, (file, shape.clone()));
+        self.files.insert(path, ((name.clone(), Arc::new(bytes)), shape.clone()));
         Ok((shape, name))
     }
 

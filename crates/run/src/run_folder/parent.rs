@@ -91,10 +91,6 @@ impl Parent {
     pub fn time(&self) -> f64 {
         self.time
     }
-    /// Steps taken up to the checkpoint.
-    pub fn steps(&self) -> u64 {
-        self.steps
-    }
     /// Hash of the case of the run.
     pub(crate) fn digest(&self) -> &str {
         &self.provenance.case_sha256

@@ -1,7 +1,6 @@
 //! Verdicts on claims, from the effects that their tests give.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use serde::Serialize;
 
@@ -23,11 +22,7 @@ pub enum Verdict {
     Open,
 }
 
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.serialize(f)
-    }
-}
+grainwake_formats::display_as_serialized!(Verdict);
 
 /// Claim and the result of its test. The JSON names are stable.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -94,7 +94,7 @@ pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec
     Some(points.take_while(|(time, _)| *time < until).collect())
 }
 
-/// Writes the thinned history of a finished run; returns whether its run folder exists.
+/// Writes the thinned history of a finished run, if its run folder exists.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -102,9 +102,9 @@ pub fn write_thinned_history(
     run: &Run,
     record: &RunRecord,
     study: &Path,
-) -> Result<bool, StudyError> {
+) -> Result<(), StudyError> {
     let Ok(grains) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
-        return Ok(false);
+        return Ok(());
     };
     let interval = record.up_and_time().map_or(0.0, |(_, unit)| INTERVAL * unit);
     let mut out = vec![HEADER.map(str::to_owned).to_vec()];
@@ -129,8 +129,7 @@ pub fn write_thinned_history(
     }
     let folder = study.join(HISTORIES);
     disk::create_folder(&folder).at("create", &folder)?;
-    write_csv(&folder.join(format!("{}.csv", run.name)), out)?;
-    Ok(true)
+    write_csv(&folder.join(format!("{}.csv", run.name)), out)
 }
 
 /// Six significant digits, with an exponent for very small and very large values.

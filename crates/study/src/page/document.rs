@@ -3,7 +3,7 @@
 use grainwake_report::html::{self, section};
 use maud::{Markup, html};
 
-use super::content::Content;
+use super::Content;
 use super::{kissing, pairs, settling, tables};
 use crate::analysis::verdict::Verdict;
 use crate::measure::record::RunRecord;

@@ -1,6 +1,5 @@
 //! The report of a study: tables, analysis, figures and one HTML page.
 
-mod content;
 mod document;
 pub mod figure;
 mod kissing;
@@ -15,13 +14,12 @@ use grainwake_report::{WrittenFigure, write_figure};
 use grainwake_run::case::Problem;
 use rayon::prelude::*;
 
-use self::content::Content;
 use self::figure::FigureData;
-use crate::analysis::correlation::correlations;
+use crate::analysis::correlation::{Correlation, correlations};
 use crate::analysis::factor_mean::factor_means;
-use crate::analysis::kissing::kissing;
+use crate::analysis::kissing::{KissingResults, kissing};
 use crate::analysis::observation::meets;
-use crate::analysis::verdict::evaluate;
+use crate::analysis::verdict::{Finding, evaluate};
 use crate::error::{At, StudyError, write_file, write_json};
 use crate::measure::record::{RunRecord, records};
 use crate::measure::table::write_tables;
@@ -42,6 +40,39 @@ pub struct StudyReportFiles {
     pub runs: (usize, usize),
 }
 
+/// Contents of the page.
+pub(crate) struct Content<'a> {
+    pub plan: &'a Plan,
+    pub records: &'a [RunRecord],
+    pub findings: &'a [Finding],
+    pub correlations: &'a [Correlation],
+    pub kissing: Option<&'a KissingResults>,
+    pub figures: &'a [WrittenFigure],
+    pub notes: &'a [String],
+}
+
+impl Content<'_> {
+    /// Returns whether any run has measured values of settling grains.
+    pub fn has_settling(&self) -> bool {
+        self.records.iter().any(|r| r.settling.is_some())
+    }
+
+    /// Returns whether any finished run is a pair, or no run has finished.
+    pub fn has_pairs(&self) -> bool {
+        !self.has_settling() || self.records.iter().any(|r| r.pair.is_some())
+    }
+
+    /// Returns whether every model was run only once.
+    pub fn without_ensemble(&self) -> bool {
+        self.records.iter().all(|r| r.member == 0)
+    }
+}
+
+/// Returns a paragraph with a heading in bold.
+fn paragraph(heading: &str, text: &maud::Markup) -> maud::Markup {
+    maud::html! { p { b { (heading) } ": " (text) } }
+}
+
 /// Writes tables, analysis, figures and page of a study folder from its finished runs.
 ///
 /// The analysis is read again from the study file, if that still exists.
@@ -57,9 +88,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     write_tables(&records, folder)?;
     let all = plan.runs.iter().zip(&records);
     let finished: Vec<(&Run, &RunRecord)> = all.filter(|(_, r)| r.finished()).collect();
-    finished
-        .par_iter()
-        .try_for_each(|(run, record)| write_thinned_history(run, record, folder).map(|_| ()))?;
+    finished.par_iter().try_for_each(|(run, record)| write_thinned_history(run, record, folder))?;
     let count = finished.len();
     let (shown_plan, shown_records) = subset(&plan, &records);
     let all = shown_plan.runs.iter().zip(&shown_records);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
-use super::content::{Content, paragraph};
+use super::{Content, paragraph};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::median;
 use crate::format::{percent, significant};

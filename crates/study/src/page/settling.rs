@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::content::{Content, paragraph};
+use super::{Content, paragraph};
 use crate::format::significant;
 use crate::measure::record::RunRecord;
 use crate::measure::settling::SettlingMeasures;

@@ -3,7 +3,7 @@
 use grainwake_report::html::{name_column, number_column, properties, table, text_column};
 use maud::{Markup, html};
 
-use super::content::Content;
+use super::Content;
 use super::settling;
 use crate::analysis::correlation::Correlation;
 use crate::analysis::verdict::Finding;

@@ -1,7 +1,6 @@
 //! State of a run in a study folder.
 
 use std::collections::BTreeSet;
-use std::fmt;
 use std::path::Path;
 
 use grainwake_formats::summary;
@@ -57,11 +56,7 @@ pub enum StateKind {
     Stale,
 }
 
-impl fmt::Display for StateKind {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        self.serialize(f)
-    }
-}
+grainwake_formats::display_as_serialized!(StateKind);
 
 /// Finished runs in `table.json` of a study folder. Their run folders may have been removed.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,5 @@
 //! `[domain]`: the box, its cells and its faces.
 
-use std::fmt;
-
 use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize, Serializer};
@@ -145,11 +143,7 @@ pub enum FaceKind {
     FreeSurface,
 }
 
-impl fmt::Display for FaceKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.serialize(f)
-    }
-}
+grainwake_formats::display_as_serialized!(FaceKind);
 
 /// Condition on one face: a word, or a table with the velocity of the wall or inflow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
