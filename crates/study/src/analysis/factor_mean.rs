@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::{Member, members};
-use super::statistics::{bootstrap_interval, mean, outcome_interval};
+use super::statistics::{bootstrap_interval, outcome_interval};
+use crate::measure::mean;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Condition};
 
@@ -62,15 +63,16 @@ pub fn factor_means(analysis: &Analysis, records: &[RunRecord]) -> Vec<FactorMea
             for factor in &request.factors {
                 out.extend(groups(&models, factor).into_iter().filter_map(|group| {
                     let (at, values): (Vec<f64>, Vec<Vec<f64>>) = group.into_iter().unzip();
-                    let means: Vec<f64> = values.iter().filter_map(|v| mean(v)).collect();
+                    let means: Vec<f64> =
+                        values.iter().filter_map(|v| mean(v.iter().copied())).collect();
                     let several = values.iter().map(Vec::len).sum::<usize>() > 1;
                     Some(FactorMean {
                         quantity: quantity.clone(),
                         factor: factor.clone(),
                         level: level.clone(),
-                        at: mean(&at)?,
+                        at: mean(at)?,
                         models: means.len(),
-                        mean: mean(&means)?,
+                        mean: mean(means)?,
                         interval: several.then(|| interval(&values)).flatten(),
                     })
                 }));

@@ -11,8 +11,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::{Member, members, other_levels, unique};
-use super::statistics::{mean, median, outcome_interval, signed_rank};
+use super::statistics::{median, outcome_interval, signed_rank};
 use super::survival::{Duration, log_rank, median_time};
+use crate::measure::mean;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Kissing};
 
@@ -206,7 +207,7 @@ fn summary(level: &str, grid: Option<&str>, models: &[&Outcomes]) -> Option<Leve
         models: models.len(),
         runs: durations.len(),
         all_some_none: [count(|s| s == 1.0), count(|s| s > 0.0 && s < 1.0), count(|s| s == 0.0)],
-        share: mean(&shares)?,
+        share: mean(shares.iter().copied())?,
         interval: outcome_interval(&members, [0.0, 1.0])?,
         median_time: median_time(&durations),
         durations,
@@ -261,8 +262,8 @@ fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2])> {
         both.map(|(a, b)| one_if_kissed(a) - one_if_kissed(b)).collect()
     };
     let members: Vec<Vec<f64>> = pairs.iter().map(common).filter(|m| !m.is_empty()).collect();
-    let means: Vec<f64> = members.iter().filter_map(|m| mean(m)).collect();
-    Some((mean(&means)?, outcome_interval(&members, [-1.0, 1.0])?))
+    let means = members.iter().filter_map(|m| mean(m.iter().copied()));
+    Some((mean(means)?, outcome_interval(&members, [-1.0, 1.0])?))
 }
 
 fn kissed(members: &BTreeMap<usize, Duration>) -> Vec<f64> {

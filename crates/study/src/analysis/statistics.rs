@@ -5,6 +5,8 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
+use crate::measure::mean;
+
 /// Number of samples of the bootstrap.
 const SAMPLES: usize = 2000;
 
@@ -165,11 +167,6 @@ fn critical_value(counts: &[f64]) -> usize {
     cut
 }
 
-/// Returns the arithmetic mean; none of an empty sample.
-pub fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
 /// Returns the 95 % interval of the mean over models of the mean over members, by a bootstrap that
 /// draws models, then members of each model, with replacement.
 ///
@@ -180,10 +177,9 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     let mut sample = || {
         let models = (0..models.len()).filter_map(|_| {
             let members = models.get(draw(models.len()))?;
-            let drawn: Vec<f64> = members.iter().map(|_| members[draw(members.len())]).collect();
-            mean(&drawn)
+            mean(members.iter().map(|_| members[draw(members.len())]))
         });
-        mean(&models.collect::<Vec<f64>>())
+        mean(models)
     };
     let samples: Vec<f64> = (0..SAMPLES).filter_map(|_| sample()).collect();
     Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])

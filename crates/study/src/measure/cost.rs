@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::mean;
 use super::record::RunRecord;
 use crate::plan::{Plan, Run};
 
@@ -20,10 +21,8 @@ pub struct Cost {
 }
 
 /// One finished run.
-struct Done {
-    memory: f64,
-    /// Estimated time on one thread [s].
-    estimate: f64,
+struct Done<'a> {
+    run: &'a Run,
     /// Measured wall-clock time times threads [s].
     time: f64,
     /// Size of the run folder [bytes], if it exists.
@@ -38,8 +37,7 @@ pub fn expected_cost(to_do: &[&Run], plan: &Plan, records: &[RunRecord], study: 
     let done: Vec<Done> = runs
         .filter_map(|(run, record)| {
             Some(Done {
-                memory: run.memory_bytes as f64,
-                estimate: run.wall_s,
+                run,
                 time: record.wall_s? * record.threads? as f64,
                 disk: folder_size(&run.folder(study)),
             })
@@ -47,15 +45,13 @@ pub fn expected_cost(to_do: &[&Run], plan: &Plan, records: &[RunRecord], study: 
         .collect();
     let mut cost = Cost { wall_s: 0.0, disk_bytes: None, basis: done.len() };
     for run in to_do {
-        let ratio = |d: &&Done| (run.memory_bytes as f64 / d.memory).ln().abs();
+        let ratio = |d: &&Done| (run.memory_bytes as f64 / d.run.memory_bytes as f64).ln().abs();
         let similar: Vec<&Done> = done.iter().filter(|d| ratio(d) < SIMILAR.ln()).collect();
         let like = if similar.is_empty() { done.iter().collect() } else { similar };
         let sum = |value: fn(&Done) -> f64| like.iter().map(|d| value(d)).sum::<f64>();
-        let scale = if like.is_empty() { 1.0 } else { sum(|d| d.time) / sum(|d| d.estimate) };
+        let scale = if like.is_empty() { 1.0 } else { sum(|d| d.time) / sum(|d| d.run.wall_s) };
         cost.wall_s += run.wall_s * scale;
-        let sizes: Vec<f64> = like.iter().filter_map(|d| d.disk).collect();
-        if !sizes.is_empty() {
-            let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
+        if let Some(mean) = mean(like.iter().filter_map(|d| d.disk)) {
             cost.disk_bytes = Some(cost.disk_bytes.unwrap_or(0.0) + mean);
         }
     }

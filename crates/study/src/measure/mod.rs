@@ -6,3 +6,9 @@ pub mod record;
 pub mod settling;
 pub mod table;
 pub mod trajectory;
+
+/// Returns the arithmetic mean; none of an empty sample.
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.into_iter().collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}

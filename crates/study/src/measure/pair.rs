@@ -10,6 +10,8 @@ use grainwake_report::features::{RunFeatures, Scales};
 use grainwake_report::run_folder::{History, RunFolder, nearest_image};
 use serde::{Deserialize, Serialize};
 
+use super::mean;
+
 /// Measured values of a pair. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PairMeasures {
@@ -223,6 +225,5 @@ pub(super) fn mean_tilt(
         let cosine = (history.orientation[i] * axis).dot(up).abs().min(1.0);
         cosine.acos().to_degrees()
     };
-    let (sum, n) = rows.fold((0.0, 0usize), |(sum, n), i| (sum + angle(i), n + 1));
-    (n > 0).then(|| sum / n as f64)
+    mean(rows.map(angle))
 }

@@ -10,6 +10,7 @@ use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::mean;
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
 use crate::error::{StudyError, read_rows};
@@ -90,9 +91,7 @@ impl RunRecord {
     /// Fills in the measured values of a finished run.
     fn measure(&mut self, folder: &Path) {
         if let Ok(summary) = Summary::read(folder) {
-            let count = summary.grains.len();
-            let sum: f64 = summary.grains.iter().map(|g| g.equivalent_diameter_m).sum();
-            self.diameter_m = (count > 0).then(|| sum / count as f64);
+            self.diameter_m = mean(summary.grains.iter().map(|g| g.equivalent_diameter_m));
             self.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
             self.steps = Some(summary.steps);
             self.end_time_s = Some(summary.end_time_s);

@@ -12,6 +12,7 @@ use grainwake_report::figure::{GrainSurface, surfaces};
 use grainwake_report::run_folder::{History, RunFolder};
 use serde::{Deserialize, Serialize};
 
+use super::mean;
 use super::pair::mean_tilt;
 
 /// Measured values of settling grains. The JSON names are stable.
@@ -102,10 +103,7 @@ impl SettlingMeasures {
 
     /// Summarises the measured values of all grains.
     fn summarise(each: Vec<GrainSettling>, scales: Scales) -> SettlingMeasures {
-        let mean = |pick: fn(&GrainSettling) -> Option<f64>| {
-            let values: Vec<f64> = each.iter().filter_map(pick).collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
+        let mean = |pick: fn(&GrainSettling) -> Option<f64>| mean(each.iter().filter_map(pick));
         let largest = |pick: fn(&GrainSettling) -> Option<f64>| {
             let values = each.iter().filter_map(pick);
             values.max_by(|a, b| a.abs().total_cmp(&b.abs()))

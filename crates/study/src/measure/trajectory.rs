@@ -6,6 +6,7 @@ use glam::DVec3;
 use grainwake_formats::disk;
 use grainwake_report::run_folder::{History, histories, nearest_image};
 
+use super::mean;
 use super::record::RunRecord;
 use super::table::write_csv;
 use crate::error::{At, StudyError};
@@ -85,13 +86,12 @@ pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec
     // The row at the landing holds the speed of the rebound.
     let until = settling.last_landing.map_or(f64::INFINITY, |t| t * unit * (1.0 - 1e-6));
     let longest = grains.iter().max_by_key(|h| h.len())?;
-    let mean = |row: usize| {
+    let speed = |row: usize| {
         let present = grains.iter().filter_map(|h| h.velocity.get(row));
-        let speeds: Vec<f64> = present.map(|v| -v.dot(up)).collect();
-        speeds.iter().sum::<f64>() / speeds.len() as f64
+        mean(present.map(|v| -v.dot(up)))
     };
-    let points = longest.time.iter().enumerate().map(|(row, time)| (*time, mean(row)));
-    Some(points.take_while(|(time, _)| *time < until).collect())
+    let rows = longest.time.iter().take_while(|time| **time < until).enumerate();
+    rows.map(|(row, time)| Some((*time, speed(row)?))).collect()
 }
 
 /// Writes the thinned history of a finished run, if its run folder exists.
