@@ -311,12 +311,5 @@ pub trait Vector:
 }
 
 /// Lane indices 0, 1, 2...
-const RAMP: [f64; MAX_LANES] = {
-    let mut ramp = [0.0; MAX_LANES];
-    let mut i = 0;
-    while i < MAX_LANES {
-        ramp[i] = i as f64;
-        i += 1;
-    }
-    ramp
-};
+const RAMP: [f64; MAX_LANES] =
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];

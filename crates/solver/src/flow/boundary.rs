@@ -9,7 +9,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Centre, FaceVector, Field, Layout};
+use crate::grid::{FaceVector, Layout};
 use crate::math::Real;
 use crate::poisson::Ends;
 
@@ -72,9 +72,7 @@ impl Boundaries {
             Boundary::Inflow { velocity } => Some((face, velocity[axis])),
         })
     }
-}
 
-impl Boundaries {
     /// Sets the normal velocity on every face where it is prescribed, and the upper faces of
     /// periodic axes; outflow faces keep theirs.
     pub(crate) fn set_normal<R: Real>(&self, velocity: &mut FaceVector<R>) {
@@ -101,73 +99,67 @@ impl Boundaries {
         }
     }
 
-    /// Fills the ghosts along x and y of one plane of a velocity component.
+    /// Fills all ghosts of a velocity `component`, or of the pressure if none.
+    pub(crate) fn fill_ghosts<R: Real>(
+        &self,
+        layout: Layout,
+        component: Option<usize>,
+        field: &mut [R],
+    ) {
+        let planes = field.chunks_exact_mut(layout.plane());
+        for plane in planes.skip(1).take(layout.cells[2]) {
+            self.fill_ghosts_of_plane(layout, component, plane);
+        }
+        self.fill_ghost_planes(layout, component, field);
+    }
+
+    /// Fills the ghosts along x and y of one plane of a field.
     pub(crate) fn fill_ghosts_of_plane<R: Real>(
         &self,
         layout: Layout,
-        component: usize,
+        component: Option<usize>,
         plane: &mut [R],
     ) {
         for axis in [0, 1] {
-            let rules = [0, 1].map(|side| self.ghost_rule(axis, side, component));
-            fill_ghosts(plane, layout, axis, rules);
+            fill_ghosts(plane, layout, axis, self.ghost_rules(axis, component));
         }
     }
 
-    /// Fills the ghost planes below and above, and the ghosts of the upper boundary faces.
-    pub(crate) fn fill_ghost_planes<R: Real>(&self, velocity: &mut FaceVector<R>) {
-        let layout = velocity.x.layout();
-        if !self.is_periodic(2) {
+    /// Fills the ghost planes of a field, and the ghosts of the upper boundary faces.
+    pub(crate) fn fill_ghost_planes<R: Real>(
+        &self,
+        layout: Layout,
+        component: Option<usize>,
+        field: &mut [R],
+    ) {
+        if component == Some(2) && !self.is_periodic(2) {
             let upper = (layout.cells[2] + 1) * layout.plane();
-            self.fill_ghosts_of_plane(layout, 2, &mut velocity.z[upper..]);
+            self.fill_ghosts_of_plane(layout, component, &mut field[upper..]);
         }
-        for component in 0..3 {
-            let rules = [0, 1].map(|side| self.ghost_rule(2, side, component));
-            fill_ghosts(velocity.component_mut(component), layout, 2, rules);
-        }
+        fill_ghosts(field, layout, 2, self.ghost_rules(2, component));
     }
 
-    /// Rule for the ghosts of a velocity component on one side of the box.
-    fn ghost_rule(&self, axis: usize, side: usize, component: usize) -> GhostRule {
-        match self.0[axis][side] {
-            Boundary::Periodic => GhostRule::Periodic,
+    /// Rules for the lower and upper ghosts along `axis` of a velocity `component`, or of the
+    /// pressure if none.
+    fn ghost_rules(&self, axis: usize, component: Option<usize>) -> [GhostRule; 2] {
+        [0, 1].map(|side| match (self.0[axis][side], component) {
+            (Boundary::Periodic, _) => GhostRule::Periodic,
             // The boundary face itself is set; only the lower side has a ghost beyond it, and no
             // interior face reads that.
-            _ if component == axis && side == 1 => GhostRule::Unused,
-            _ if component == axis => GhostRule::ZeroGradient,
-            Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
+            (_, Some(normal)) if normal == axis => {
+                [GhostRule::ZeroGradient, GhostRule::Unused][side]
+            }
+            (Boundary::Wall { velocity } | Boundary::Inflow { velocity }, Some(component)) => {
                 GhostRule::Wall(velocity[component])
             }
-            Boundary::Slip | Boundary::FreeSurface | Boundary::Outflow => GhostRule::ZeroGradient,
-        }
+            _ => GhostRule::ZeroGradient,
+        })
     }
-}
 
-impl Boundaries {
     /// Conditions on the pressure at the ends of each axis: outflows too have a zero normal
     /// gradient.
     pub(crate) fn pressure_ends(&self) -> [Ends; 3] {
         self.periodic().map(|periodic| if periodic { Ends::Periodic } else { Ends::Neumann })
-    }
-
-    /// Fills the ghosts along x and y of one plane of the pressure.
-    pub(crate) fn fill_pressure_of_plane<R: Real>(&self, layout: Layout, plane: &mut [R]) {
-        for axis in [0, 1] {
-            fill_ghosts(plane, layout, axis, self.pressure_rules(axis));
-        }
-    }
-
-    /// Fills the ghost planes of the pressure.
-    pub(crate) fn fill_pressure_planes<R: Real>(&self, pressure: &mut Field<Centre, R>) {
-        let layout = pressure.layout();
-        fill_ghosts(pressure, layout, 2, self.pressure_rules(2));
-    }
-
-    fn pressure_rules(&self, axis: usize) -> [GhostRule; 2] {
-        match self.pressure_ends()[axis] {
-            Ends::Periodic => [GhostRule::Periodic; 2],
-            Ends::Neumann => [GhostRule::ZeroGradient; 2],
-        }
     }
 }
 

@@ -29,10 +29,10 @@ use rayon::prelude::*;
 
 use crate::grid::{Axis, Centre, FaceVector, Field, FieldView, Mesh, planes_of};
 use crate::math::{Real, last_cache};
-use crate::poisson::{Plane, Poisson, PoissonTimes};
+use crate::poisson::{Plane, Poisson, PoissonTimes, Solution};
 use grainwake_simd::dispatch;
-use prediction::{Coefficients, PredictPlane, Weights};
-use project::{Correct, Divergence, PlaneMeasures};
+use prediction::{Coefficients, PredictPlane};
+use project::{Correct, Divergence, FacePlanes, PlaneMeasures};
 
 /// Properties of the fluid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,6 @@ pub struct Flow<R = f64> {
     mesh: Mesh,
     /// Conditions on the faces of the box.
     boundaries: Boundaries,
-    /// Constants of the tendency.
     coefficients: Coefficients,
     /// Velocity u^n [m/s].
     pub velocity: FaceVector<R>,
@@ -82,8 +81,6 @@ pub struct Flow<R = f64> {
     partial: Vec<PlaneMeasures>,
     /// Length of the last step [s]; none before the first.
     previous_step: Option<f64>,
-    /// Weight of H^n in the last prediction [s].
-    weight: f64,
     /// Sums of H over the unknown faces: three of the previous step, then three of the last one.
     tendency_sums: [f64; 6],
     /// Sum over the unknown faces of the weighted tendencies of the last prediction [m/s].
@@ -100,11 +97,7 @@ impl<R: Real> Flow<R> {
         let mut flow = Flow {
             mesh: *mesh,
             boundaries,
-            coefficients: Coefficients::new(
-                mesh,
-                params.kinematic_viscosity,
-                params.body_acceleration,
-            ),
+            coefficients: Coefficients::new(mesh, params),
             velocity: FaceVector::zeros(mesh),
             predicted: FaceVector::zeros(mesh),
             pressure: Field::zeros(mesh),
@@ -113,7 +106,6 @@ impl<R: Real> Flow<R> {
             non_temporal: false,
             partial: vec![PlaneMeasures::default(); mesh.cells[2]],
             previous_step: None,
-            weight: 0.0,
             tendency_sums: [0.0; 6],
             impulse: DVec3::ZERO,
             pressure_rise: DVec3::ZERO,
@@ -133,24 +125,15 @@ impl<R: Real> Flow<R> {
 
     /// Fills the ghosts of the velocity by the present conditions on the sides.
     pub fn fill_ghosts(&mut self) {
-        let (layout, boundaries) = (self.mesh.layout(), &self.boundaries);
-        for component in 0..3 {
-            let planes = self.velocity.component_mut(component).chunks_exact_mut(layout.plane());
-            for plane in planes.skip(1).take(layout.cells[2]) {
-                boundaries.fill_ghosts_of_plane(layout, component, plane);
-            }
+        for axis in 0..3 {
+            let component = self.velocity.component_mut(axis);
+            self.boundaries.fill_ghosts(self.mesh.layout(), Some(axis), component);
         }
-        boundaries.fill_ghost_planes(&mut self.velocity);
     }
 
     /// Fills the ghosts of the pressure.
     fn fill_pressure_ghosts(&mut self) {
-        let layout = self.mesh.layout();
-        let planes = self.pressure.chunks_exact_mut(layout.plane());
-        for plane in planes.skip(1).take(layout.cells[2]) {
-            self.boundaries.fill_pressure_of_plane(layout, plane);
-        }
-        self.boundaries.fill_pressure_planes(&mut self.pressure);
+        self.boundaries.fill_ghosts(self.mesh.layout(), None, &mut self.pressure);
     }
 
     /// Sets the uniform acceleration that drives the flow [m/s^2].
@@ -180,19 +163,19 @@ impl<R: Real> Flow<R> {
     pub fn predict(&mut self, dt: f64) {
         let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
         let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
-        let weights =
-            Weights { now, before, dt_per_h: self.mesh.spacing.to_array().map(|h| dt / h) };
+        self.coefficients.now = now;
+        self.coefficients.before = before;
+        self.coefficients.dt_per_h = self.mesh.spacing.to_array().map(|h| dt / h);
         let (layout, periodic) = (self.mesh.layout(), self.boundaries.periodic());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);
         let (coefficients, non_temporal) = (&self.coefficients, self.non_temporal);
-        let FaceVector { x, y, z } = &mut self.tendency;
-        let FaceVector { x: px, y: py, z: pz } = &mut self.predicted;
-        let planes = planes_of(layout, [&mut *x, y, z, px, py, pz], &mut self.partial);
+        let [x, y, z] = self.tendency.components_mut();
+        let [px, py, pz] = self.predicted.components_mut();
+        let planes = planes_of(layout, [x, y, z, px, py, pz], &mut self.partial);
         planes.for_each(|(k, [x, y, z, px, py, pz], partial)| {
             dispatch(PredictPlane {
                 layout,
                 coefficients,
-                weights,
                 velocity,
                 pressure,
                 periodic,
@@ -205,8 +188,7 @@ impl<R: Real> Flow<R> {
             boundaries.set_normal_of_plane(layout, [px, py]);
         });
         for (face, value) in boundaries.prescribed_faces(2, layout.cells[2]) {
-            let plane = layout.plane();
-            pz[face * plane..(face + 1) * plane].fill(R::of(value));
+            self.predicted.z[face * layout.plane()..][..layout.plane()].fill(R::of(value));
         }
         let sum = self.partial.iter().fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
         let [_, _, _, x, y, z] = self.tendency_sums;
@@ -214,66 +196,45 @@ impl<R: Real> Flow<R> {
         self.impulse = now * sum + before * DVec3::new(x, y, z);
         self.convect_outflow(dt);
         self.previous_step = Some(dt);
-        self.weight = now;
     }
 
     /// Solves lap(f) = div(u*)/dt, sets u = u* - dt grad(f), p += f, and fills the ghosts.
     pub fn project(&mut self, dt: f64) -> FlowMeasures {
-        let layout = self.mesh.layout();
-        let [row, plane] = [layout.row(), layout.plane()];
-        let [nx, ny, nz] = layout.cells;
-        let inverse = self.mesh.spacing.to_array().map(|h| 1.0 / h);
-        let periodic = self.boundaries.periodic();
+        let (mesh, layout) = (&self.mesh, self.mesh.layout());
+        let (periodic, non_temporal) = (self.boundaries.periodic(), self.non_temporal);
         let (predicted, boundaries) = (&self.predicted, &self.boundaries);
-        let non_temporal = self.non_temporal;
         let divergence = |k: usize, out: &mut Plane<R>| {
-            dispatch(Divergence { layout, periodic, predicted, k, inverse, dt, out });
+            let faces = FacePlanes::new(mesh, periodic, predicted, k);
+            dispatch(Divergence { faces, dt, out });
         };
-        let FaceVector { x, y, z } = &mut self.velocity;
-        let fields = [&mut **x, &mut **y, &mut **z, &mut *self.pressure];
-        let partial = &mut self.partial;
-        self.poisson.solve(
-            non_temporal,
-            divergence,
-            fields,
-            partial,
-            |k, solution, [x, y, z, p], measures| {
-                dispatch(Correct {
-                    layout,
-                    predicted,
-                    solution,
-                    periodic,
-                    k,
-                    inverse,
-                    dt_per_h: inverse.map(|inverse| dt * inverse),
-                    non_temporal,
-                    velocity: [&mut *x, &mut *y, &mut *z],
-                    pressure: &mut *p,
-                    measures,
-                });
-                // The upper boundary faces keep the predicted velocity.
-                if !periodic[0] {
-                    for j in 1..=ny {
-                        let at = j * row + nx + 1;
-                        x[at] = predicted.x[k * plane + at];
-                    }
-                }
-                if !periodic[1] {
-                    let upper = (ny + 1) * row..(ny + 2) * row;
-                    y[upper.clone()].copy_from_slice(&predicted.y[k * plane..][upper]);
-                }
-                for (component, q) in [x, y, z].into_iter().enumerate() {
-                    boundaries.fill_ghosts_of_plane(layout, component, q);
-                }
-                boundaries.fill_pressure_of_plane(layout, p);
-            },
-        );
+        let [x, y, z] = self.velocity.components_mut();
+        let correct = |k: usize, solution: Solution<R>, fields: [&mut [R]; 4], measures: &mut _| {
+            let [x, y, z, p] = fields;
+            dispatch(Correct {
+                faces: FacePlanes::new(mesh, periodic, predicted, k),
+                solution,
+                k,
+                dt,
+                non_temporal,
+                velocity: [&mut *x, &mut *y, &mut *z],
+                pressure: &mut *p,
+                measures,
+            });
+            let components = [Some(0), Some(1), Some(2), None];
+            for (component, field) in components.into_iter().zip([x, y, z, p]) {
+                boundaries.fill_ghosts_of_plane(layout, component, field);
+            }
+        };
+        let fields = [x, y, z, &mut self.pressure];
+        self.poisson.solve(non_temporal, divergence, fields, &mut self.partial, correct);
         if !periodic[2] {
-            let upper = (nz + 1) * plane..;
-            z[upper.clone()].copy_from_slice(&predicted.z[upper]);
+            let upper = (layout.cells[2] + 1) * layout.plane()..;
+            self.velocity.z[upper.clone()].copy_from_slice(&predicted.z[upper]);
         }
-        boundaries.fill_pressure_planes(&mut self.pressure);
-        boundaries.fill_ghost_planes(&mut self.velocity);
+        boundaries.fill_ghost_planes(layout, None, &mut self.pressure);
+        for axis in 0..3 {
+            boundaries.fill_ghost_planes(layout, Some(axis), self.velocity.component_mut(axis));
+        }
         self.total()
     }
 

@@ -40,11 +40,6 @@ impl BoxSide {
     pub fn boundary(self, boundaries: &Boundaries) -> Boundary {
         boundaries.0[self.axis][self.side]
     }
-    /// Indices of the layer of faces on the side, and of the layer inwards of it.
-    fn layers(self, mesh: &Mesh) -> [usize; 2] {
-        let n = mesh.cells[self.axis];
-        if self.side == 0 { [1, 2] } else { [n + 1, n] }
-    }
 }
 
 /// Face of an open side that a grain covers, in whole or in part.
@@ -169,15 +164,14 @@ struct BoundaryFaces {
 impl BoundaryFaces {
     fn new(mesh: &Mesh, side: BoxSide) -> BoundaryFaces {
         let (layout, axis) = (mesh.layout(), side.axis);
-        let [face, inner] = side.layers(mesh);
         let mut first = [1; 3];
-        first[axis] = face;
+        first[axis] += side.side * mesh.cells[axis];
         let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
         let strides = layout.strides();
         BoundaryFaces {
             start: layout.index(first[0], first[1], first[2]),
             depth: strides[axis],
-            inward: (inner as isize - face as isize) * strides[axis] as isize,
+            inward: (1 - 2 * side.side as isize) * strides[axis] as isize,
             steps: [strides[a], strides[b]],
             counts: [mesh.cells[a], mesh.cells[b]],
             count: mesh.cells[a] * mesh.cells[b],

@@ -14,14 +14,14 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Boundaries, Flow};
+use super::{Boundaries, Flow, FluidParams};
 use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
 use grainwake_simd::{
     Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, window, window_mut,
 };
 
-/// Constants of the tendency.
+/// Coefficients of the tendency H and of the prediction u* = u + now H + before H_old - dt grad p.
 #[derive(Clone, Copy)]
 pub struct Coefficients {
     /// 1/(4 h) along each axis [1/m]: value and velocity of a link are means of two.
@@ -30,16 +30,25 @@ pub struct Coefficients {
     nu_inverse_square: [f64; 3],
     /// Uniform acceleration that drives the flow [m/s^2].
     pub(super) acceleration: DVec3,
+    /// Weight of H [s].
+    pub(super) now: f64,
+    /// Weight of H_old [s].
+    pub(super) before: f64,
+    /// Weight dt/h of the pressure difference along each axis [s/m].
+    pub(super) dt_per_h: [f64; 3],
 }
 
 impl Coefficients {
-    /// Constants of a mesh, kinematic viscosity [m^2/s] and body acceleration [m/s^2].
-    pub fn new(mesh: &Mesh, kinematic_viscosity: f64, acceleration: DVec3) -> Coefficients {
+    /// Coefficients for a mesh and the properties of a fluid, before the first time step.
+    pub fn new(mesh: &Mesh, params: &FluidParams) -> Coefficients {
         let h = mesh.spacing.to_array();
         Coefficients {
             quarter_inverse: h.map(|h| 0.25 / h),
-            nu_inverse_square: h.map(|h| kinematic_viscosity / (h * h)),
-            acceleration,
+            nu_inverse_square: h.map(|h| params.kinematic_viscosity / (h * h)),
+            acceleration: params.body_acceleration,
+            now: 0.0,
+            before: 0.0,
+            dt_per_h: [0.0; 3],
         }
     }
 
@@ -65,25 +74,10 @@ impl Coefficients {
     }
 }
 
-/// Weights of the terms of the prediction.
-#[derive(Clone, Copy)]
-pub struct Weights {
-    /// Weight of the new tendency [s].
-    pub now: f64,
-    /// Weight of the old tendency [s].
-    pub before: f64,
-    /// Weight dt/h of the pressure difference along each axis [s/m].
-    pub dt_per_h: [f64; 3],
-}
-
-/// One plane of the prediction u* = u + now H + before H_old - dt grad p.
+/// One plane of the prediction.
 pub struct PredictPlane<'a, R> {
-    /// Layout of all fields.
     pub layout: Layout,
-    /// Constants of the tendency.
     pub coefficients: &'a Coefficients,
-    /// Weights of the terms.
-    pub weights: Weights,
     /// Velocity u^n with ghosts [m/s].
     pub velocity: &'a FaceVector<R>,
     /// Pressure over density p^n with ghosts [m^2/s^2].
@@ -107,30 +101,24 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
         let (layout, k, n) = (self.layout, self.k, self.layout.cells[0]);
-        let (coefficients, weights) = (*self.coefficients, self.weights);
+        let coefficients = *self.coefficients;
         let u = planes(layout, &self.velocity.x, k);
         let v = planes(layout, &self.velocity.y, k);
         let w = planes(layout, &self.velocity.z, k);
         let p = planes(layout, self.pressure, k);
-        let [tx, ty, tz] = self.tendency.map(|plane| &mut plane[..layout.plane()]);
-        let [px, py, pz] = self.predicted.map(|plane| &mut plane[..layout.plane()]);
+        let mut tendency = self.tendency.map(|plane| &mut plane[..layout.plane()]);
+        let mut predicted = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
         for j in 1..=layout.cells[1] {
-            let predicted =
-                [layout.row_of_mut(px, j), layout.row_of_mut(py, j), layout.row_of_mut(pz, j)];
+            let predicted = layout.rows_of_mut(&mut predicted, j);
             let streamed = if self.non_temporal { inner_lines::<V>(predicted[0], n) } else { 0..0 };
             let mut work = PredictRow {
                 coefficients,
-                weights,
                 u: rows(layout, u, j),
                 v: rows(layout, v, j),
                 w: rows(layout, w, j),
                 p: rows(layout, p, j),
-                tendency: [
-                    layout.row_of_mut(tx, j),
-                    layout.row_of_mut(ty, j),
-                    layout.row_of_mut(tz, j),
-                ],
+                tendency: layout.rows_of_mut(&mut tendency, j),
                 predicted,
                 sums: &mut sums,
                 prescribed: [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1],
@@ -154,28 +142,18 @@ fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
     [layout.plane_of(field, k - 1), layout.plane_of(field, k), layout.plane_of(field, k + 1)]
 }
 
-/// Rows j - 1, j, j + 1 of the planes k - 1, k, k + 1, all of one length, so that one bounds check
-/// serves all of them.
+/// Rows j - 1, j, j + 1, each of the planes k - 1, k, k + 1. All have one length, so that one bounds
+/// check serves all of them.
 type Rows<'a, R> = [[&'a [R]; 3]; 3];
 
 #[inline(always)]
-fn rows<'a, R>(layout: Layout, [below, here, above]: [&'a [R]; 3], j: usize) -> Rows<'a, R> {
-    [
-        rows_of_plane(layout, below, j),
-        rows_of_plane(layout, here, j),
-        rows_of_plane(layout, above, j),
-    ]
-}
-
-#[inline(always)]
-fn rows_of_plane<R>(layout: Layout, plane: &[R], j: usize) -> [&[R]; 3] {
-    [layout.row_of(plane, j - 1), layout.row_of(plane, j), layout.row_of(plane, j + 1)]
+fn rows<'a, R>(layout: Layout, planes: [&'a [R]; 3], j: usize) -> Rows<'a, R> {
+    [layout.rows_of(planes, j - 1), layout.rows_of(planes, j), layout.rows_of(planes, j + 1)]
 }
 
 /// One row of the prediction.
 struct PredictRow<'a, R> {
     coefficients: Coefficients,
-    weights: Weights,
     u: Rows<'a, R>,
     v: Rows<'a, R>,
     w: Rows<'a, R>,
@@ -198,15 +176,15 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
         let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
         let c = &self.coefficients;
-        let [[_, ub, _], [um, u, up], [_, ut, _]] = self.u;
+        let [[_, um, _], [ub, u, ut], [_, up, _]] = self.u;
         let (ul, uc, ur) = (left(u), here(u), right(u));
         let (umr, ubr) = (right(um), right(ub));
         let (um, up, ub, ut) = (here(um), here(up), here(ub), here(ut));
-        let [[_, vb, vpb], [vm, v, vp], [_, vt, _]] = self.v;
+        let [[_, vm, _], [vb, v, vt], [vpb, vp, _]] = self.v;
         let (vl, vc, vr) = (left(v), here(v), right(v));
         let (vpl, vpb) = (left(vp), here(vpb));
         let (vm, vp, vb, vt) = (here(vm), here(vp), here(vb), here(vt));
-        let [[_, wb, _], [wm, w, wp], [wmt, wt, _]] = self.w;
+        let [[_, wm, wmt], [wb, w, wt], [_, wp, _]] = self.w;
         let (wl, wc, wr) = (left(w), here(w), right(w));
         let (wtl, wmt) = (left(wt), here(wmt));
         let (wm, wp, wb, wt) = (here(wm), here(wp), here(wb), here(wt));
@@ -229,15 +207,15 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             [[wl, wr], [wm, wp], [wb, wt]],
             [[ub + uc, ubr + ur], [vb + vc, vpb + vp], [wb + wc, wc + wt]],
         );
-        let [[_, pb, _], [pm, p, _], _] = self.p;
+        let [[_, pm, _], [pb, p, _], _] = self.p;
         let pc = here(p);
         let lower = [left(p), here(pm), here(pb)];
-        let (now, before) = (V::constant(self.weights.now), V::constant(self.weights.before));
+        let (now, before) = (V::constant(c.now), V::constant(c.before));
         // Boundary conditions read the ends of a row, which therefore stay in the cache.
         let streamed = self.streamed.contains(&i);
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
-            let pressure = V::constant(self.weights.dt_per_h[axis]) * (pc - lower[axis]);
+            let pressure = V::constant(c.dt_per_h[axis]) * (pc - lower[axis]);
             // Small terms are summed before q is added: fewer of their digits are lost.
             let gain = now * h + before * V::load(old) - pressure;
             let to = window_mut::<V>(self.predicted[axis], i);
@@ -279,7 +257,7 @@ pub struct Prediction<'a, R> {
 impl<R: Real> Flow<R> {
     /// State at t^n, and the prediction of each component.
     pub fn prediction(&mut self) -> (OldState<'_, R>, [Prediction<'_, R>; 3]) {
-        let weight = self.weight;
+        let weight = self.coefficients.now;
         let old = OldState {
             mesh: &self.mesh,
             boundaries: &self.boundaries,
@@ -287,44 +265,34 @@ impl<R: Real> Flow<R> {
             pressure: &self.pressure,
             body_acceleration: self.coefficients.acceleration,
         };
-        let predictions = fields(&mut self.tendency, &mut self.predicted);
-        let predictions =
-            predictions.map(|[tendency, velocity]| Prediction::new(weight, 0, tendency, velocity));
-        (old, predictions)
+        let fields = fields(&mut self.tendency, &mut self.predicted);
+        (old, fields.map(|fields| Prediction::new(weight, 0, fields)))
     }
 
     /// Calls `each(component, prediction)` for slabs of all components in parallel.
     pub fn for_predictions(&mut self, each: impl Fn(usize, Prediction<R>) + Sync) {
-        let (weight, layout) = (self.weight, self.mesh.layout());
+        let weight = self.coefficients.now;
         let fields = fields(&mut self.tendency, &mut self.predicted);
-        for_slabs(layout, fields, |component, start, [tendency, velocity]| {
-            each(component, Prediction::new(weight, start, tendency, velocity));
+        for_slabs(self.mesh.layout(), fields, |component, start, fields| {
+            each(component, Prediction::new(weight, start, fields));
         });
     }
 }
 
 /// Components of two vector fields, paired by axis.
-fn fields<'a, R>(
+fn fields<'a, R: Real>(
     one: &'a mut FaceVector<R>,
     other: &'a mut FaceVector<R>,
 ) -> [[&'a mut [R]; 2]; 3] {
-    let FaceVector { x, y, z } = one;
-    let FaceVector { x: ox, y: oy, z: oz } = other;
-    [[&mut **x, &mut **ox], [y, oy], [z, oz]]
+    let ([x, y, z], [ox, oy, oz]) = (one.components_mut(), other.components_mut());
+    [[x, ox], [y, oy], [z, oz]]
 }
 
 impl<'a, R: Real> Prediction<'a, R> {
-    fn new(
-        weight: f64,
-        start: usize,
-        tendency: &'a mut [R],
-        velocity: &'a mut [R],
-    ) -> Prediction<'a, R> {
-        Prediction {
-            weight,
-            tendency: SharedRows::new(start, tendency),
-            velocity: SharedRows::new(start, velocity),
-        }
+    /// Prediction of slabs of tendency and velocity that start at position `start` of their fields.
+    fn new(weight: f64, start: usize, slabs: [&'a mut [R]; 2]) -> Prediction<'a, R> {
+        let [tendency, velocity] = slabs.map(|slab| SharedRows::new(start, slab));
+        Prediction { weight, tendency, velocity }
     }
 
     /// Second handle to the same faces.

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::grid::{FaceVector, Layout};
+use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{
@@ -41,52 +41,59 @@ pub struct PlaneMeasures {
     pub pressure_rise: [f64; 2],
 }
 
-/// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
-pub struct Divergence<'a, R> {
-    /// Layout of all fields.
+/// Planes of the prediction u* on the faces of one plane of cells [m/s].
+pub struct FacePlanes<'a, R> {
     pub layout: Layout,
     /// Whether each axis is periodic.
     pub periodic: [bool; 3],
-    /// Prediction u* [m/s].
-    pub predicted: &'a FaceVector<R>,
-    /// Index of the plane.
-    pub k: usize,
     /// 1/h along each axis [1/m].
     pub inverse: [f64; 3],
-    /// Time step [s].
-    pub dt: f64,
-    /// Divergence over dt [1/s^2], overwritten.
-    pub out: &'a mut Plane<R>,
+    /// Lower faces of the cells along each axis.
+    lower: [&'a [R]; 3],
+    /// Upper faces along z.
+    above: &'a [R],
 }
 
-impl<R: Real> Kernel for Divergence<'_, R> {
-    type Number = R;
+impl<'a, R: Real> FacePlanes<'a, R> {
+    /// Faces of the plane `k` of cells.
+    pub fn new(
+        mesh: &Mesh,
+        periodic: [bool; 3],
+        predicted: &'a FaceVector<R>,
+        k: usize,
+    ) -> FacePlanes<'a, R> {
+        let layout = mesh.layout();
+        let FaceVector { x, y, z } = predicted;
+        FacePlanes {
+            layout,
+            periodic,
+            inverse: mesh.spacing.to_array().map(|h| 1.0 / h),
+            lower: [layout.plane_of(x, k), layout.plane_of(y, k), layout.plane_of(z, k)],
+            above: layout.plane_of(z, next(k, layout.cells[2], periodic[2])),
+        }
+    }
+
+    /// Faces of row `j` of the cells.
     #[inline(always)]
-    fn run<V: Vector<Number = R>>(self) {
-        let Divergence { layout, periodic, predicted, k, inverse, dt, out } = self;
-        let [n, ny, nz] = layout.cells;
-        let u = layout.plane_of(&predicted.x, k);
-        let v = layout.plane_of(&predicted.y, k);
-        let w = layout.plane_of(&predicted.z, k);
-        let wt = layout.plane_of(&predicted.z, next(k, nz, periodic[2]));
-        for j in 1..=ny {
-            let mut work = DivergenceRow {
-                u: layout.row_of(u, j),
-                v: layout.row_of(v, j),
-                vp: layout.row_of(v, next(j, ny, periodic[1])),
-                w: layout.row_of(w, j),
-                wt: layout.row_of(wt, j),
-                inverse,
-                dt,
-                out: &mut out.row_mut(j)[..n + 2],
-            };
-            if periodic[0] {
-                // The upper face of the last cell is the lower face of the first.
-                along_row::<V>(n - 1, &mut work);
-                work.value(n, Scalar(work.u[1]));
-            } else {
-                along_row::<V>(n, &mut work);
-            }
+    fn row(&self, j: usize) -> FaceRows<'a, R> {
+        let (layout, [n, ny, _]) = (self.layout, self.layout.cells);
+        FaceRows {
+            lower: layout.rows_of(self.lower, j),
+            vp: layout.row_of(self.lower[1], next(j, ny, self.periodic[1])),
+            wt: layout.row_of(self.above, j),
+            wrapped: if self.periodic[0] { n } else { 0 },
+        }
+    }
+
+    /// Computes a row of cells. The last cell of a periodic row is computed alone.
+    #[inline(always)]
+    fn along_row<V: Vector<Number = R>>(&self, work: &mut impl RowWork<Number = R>) {
+        let n = self.layout.cells[0];
+        if self.periodic[0] {
+            along_row::<V>(n - 1, work);
+            work.at::<Scalar<R>>(n);
+        } else {
+            along_row::<V>(n, work);
         }
     }
 }
@@ -97,56 +104,87 @@ fn next(at: usize, n: usize, periodic: bool) -> usize {
     if at == n && periodic { 1 } else { at + 1 }
 }
 
-/// One row of cells. All slices have one length, so that one bounds check serves all of them.
-struct DivergenceRow<'a, R> {
-    u: &'a [R],
-    v: &'a [R],
+/// Rows of the prediction on the faces of one row of cells. All slices of the rows here and below
+/// have one length, so that one bounds check serves all of them.
+struct FaceRows<'a, R> {
+    /// Lower faces of the cells along each axis.
+    lower: [&'a [R]; 3],
+    /// Upper faces along y and along z.
     vp: &'a [R],
-    w: &'a [R],
     wt: &'a [R],
+    /// Last cell of a periodic row, else 0.
+    wrapped: usize,
+}
+
+impl<R: Real> FaceRows<'_, R> {
+    /// Prediction on the lower and on the upper faces of the cells from `i` on, along each axis.
+    #[inline(always)]
+    fn load<V: Vector<Number = R>>(&self, i: usize) -> [[V; 3]; 2] {
+        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
+        let [u, v, w] = self.lower;
+        let ur = if V::WIDTH == 1 && i == self.wrapped {
+            // The upper face of the last cell is the lower face of the first.
+            V::splat(u[1])
+        } else {
+            V::load(&window::<V>(u, i)[2..])
+        };
+        [[here(u), here(v), here(w)], [ur, here(self.vp), here(self.wt)]]
+    }
+}
+
+/// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
+pub struct Divergence<'a, R> {
+    /// Prediction u*.
+    pub faces: FacePlanes<'a, R>,
+    /// Time step [s].
+    pub dt: f64,
+    /// Divergence over dt [1/s^2], overwritten.
+    pub out: &'a mut Plane<R>,
+}
+
+impl<R: Real> Kernel for Divergence<'_, R> {
+    type Number = R;
+    #[inline(always)]
+    fn run<V: Vector<Number = R>>(self) {
+        let Divergence { faces, dt, out } = self;
+        let [n, ny, _] = faces.layout.cells;
+        for j in 1..=ny {
+            let out = &mut out.row_mut(j)[..n + 2];
+            let inverse = faces.inverse;
+            faces.along_row::<V>(&mut DivergenceRow { faces: faces.row(j), inverse, dt, out });
+        }
+    }
+}
+
+/// One row of cells.
+struct DivergenceRow<'a, R> {
+    faces: FaceRows<'a, R>,
     inverse: [f64; 3],
     dt: f64,
     out: &'a mut [R],
-}
-
-impl<R: Real> DivergenceRow<'_, R> {
-    /// Cells from `i` on, whose upper x faces have the velocity `ur`.
-    #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
-        let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
-        let [x, y, z] = self.inverse.map(V::constant);
-        let sum = (ur - here(self.u)) * x
-            + (here(self.vp) - here(self.v)) * y
-            + (here(self.wt) - here(self.w)) * z;
-        sum.div(V::constant(self.dt)).store(window_mut::<V>(self.out, i));
-    }
 }
 
 impl<R: Real> RowWork for DivergenceRow<'_, R> {
     type Number = R;
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        let ur = V::load(&window::<V>(self.u, i)[2..]);
-        self.value(i, ur);
+        let [[u, v, w], [ur, vp, wt]] = self.faces.load::<V>(i);
+        let [x, y, z] = self.inverse.map(V::constant);
+        let sum = (ur - u) * x + (vp - v) * y + (wt - w) * z;
+        sum.div(V::constant(self.dt)).store(window_mut::<V>(self.out, i));
     }
 }
 
 /// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
-    /// Layout of all fields.
-    pub layout: Layout,
-    /// Prediction u* [m/s].
-    pub predicted: &'a FaceVector<R>,
+    /// Prediction u*.
+    pub faces: FacePlanes<'a, R>,
     /// Pressure increment over density f [m^2/s^2].
     pub solution: Solution<'a, R>,
-    /// Whether each axis is periodic.
-    pub periodic: [bool; 3],
     /// Index of the plane.
     pub k: usize,
-    /// 1/h along each axis [1/m].
-    pub inverse: [f64; 3],
-    /// dt/h along each axis [s/m].
-    pub dt_per_h: [f64; 3],
+    /// Time step [s].
+    pub dt: f64,
     /// Whether the velocity is written with non-temporal stores.
     pub non_temporal: bool,
     /// Plane of the corrected velocity [m/s], overwritten.
@@ -161,46 +199,42 @@ impl<R: Real> Kernel for Correct<'_, R> {
     type Number = R;
     #[inline(always)]
     fn run<V: Vector<Number = R>>(self) {
-        let (layout, k, periodic) = (self.layout, self.k, self.periodic);
-        let [n, ny, nz] = layout.cells;
-        let u = layout.plane_of(&self.predicted.x, k);
-        let v = layout.plane_of(&self.predicted.y, k);
-        let w = layout.plane_of(&self.predicted.z, k);
-        let wt = layout.plane_of(&self.predicted.z, next(k, nz, periodic[2]));
-        let [x, y, z] = self.velocity.map(|plane| &mut plane[..layout.plane()]);
+        let FacePlanes { layout, periodic, inverse, .. } = self.faces;
+        let [n, ny, _] = layout.cells;
+        let mut velocity = self.velocity.map(|plane| &mut plane[..layout.plane()]);
         let p = &mut self.pressure[..layout.plane()];
         let Solution { here: f, below: fb, above: ft } = self.solution;
         let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
-            let out = [layout.row_of_mut(x, j), layout.row_of_mut(y, j), layout.row_of_mut(z, j)];
+            let out = layout.rows_of_mut(&mut velocity, j);
             let streamed = if self.non_temporal { inner_lines::<V>(out[0], n) } else { 0..0 };
             let mut work = CorrectRow {
-                q: [layout.row_of(u, j), layout.row_of(v, j), layout.row_of(w, j)],
-                vp: layout.row_of(v, next(j, ny, periodic[1])),
-                wt: layout.row_of(wt, j),
+                faces: self.faces.row(j),
                 f: &f.row(j)[..n + 2],
                 lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
-                inverse: self.inverse,
-                dt_per_h: self.dt_per_h,
+                inverse,
+                dt_per_h: inverse.map(|inverse| self.dt * inverse),
                 out,
                 pressure: layout.row_of_mut(p, j),
                 streamed,
                 partial: &mut partial,
-                prescribed: [false, !periodic[1] && j == 1, !periodic[2] && k == 1],
+                prescribed: [false, !periodic[1] && j == 1, !periodic[2] && self.k == 1],
             };
-            if periodic[0] {
-                // The upper face of the last cell is the lower face of the first.
-                along_row::<V>(n - 1, &mut work);
-                work.value(n, Scalar(work.q[0][1]));
-            } else {
-                along_row::<V>(n, &mut work);
+            self.faces.along_row::<V>(&mut work);
+            if !periodic[0] {
                 // The sum contains the lower boundary face, which is no unknown.
                 let prescribed = -work.out[0][1].wide();
                 work.partial.momentum[0].add(1, Scalar::<R>::constant(prescribed));
+                // The upper boundary face keeps the predicted velocity.
+                work.out[0][n + 1] = work.faces.lower[0][n + 1];
             }
             rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
+        }
+        if !periodic[1] {
+            let predicted = layout.row_of(self.faces.lower[1], ny + 1);
+            layout.row_of_mut(velocity[1], ny + 1).copy_from_slice(predicted);
         }
         let (first, last) = (layout.row_of(p, 1), layout.row_of(p, ny));
         for i in 1..=n {
@@ -231,12 +265,9 @@ struct CorrectPartial<R> {
     momentum: [Partial; 3],
 }
 
-/// One row of cells. All slices have one length, so that one bounds check serves all of them.
+/// One row of cells.
 struct CorrectRow<'a, R> {
-    /// Prediction on the lower faces, and on the upper ones along y and z.
-    q: [&'a [R]; 3],
-    vp: &'a [R],
-    wt: &'a [R],
+    faces: FaceRows<'a, R>,
     f: &'a [R],
     /// Increment one row down in y and in z, and one row up.
     lower: [&'a [R]; 2],
@@ -252,17 +283,17 @@ struct CorrectRow<'a, R> {
     prescribed: [bool; 3],
 }
 
-impl<R: Real> CorrectRow<'_, R> {
-    /// Cells from `i` on, whose upper x faces have the predicted velocity `ur`.
+impl<R: Real> RowWork for CorrectRow<'_, R> {
+    type Number = R;
     #[inline(always)]
-    fn value<V: Vector<Number = R>>(&mut self, i: usize, ur: V) {
+    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         let left = |row: &[R]| V::load(window::<V>(row, i));
         let here = |row: &[R]| V::load(&window::<V>(row, i)[1..]);
         let right = |row: &[R]| V::load(&window::<V>(row, i)[2..]);
         let f = here(self.f);
         let lower = [left(self.f), here(self.lower[0]), here(self.lower[1])];
         let upper = [right(self.f), here(self.upper[0]), here(self.upper[1])];
-        let above = [ur, here(self.vp), here(self.wt)];
+        let [predicted, above] = self.faces.load::<V>(i);
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
         // The ghosts are filled from the ends of a row, which therefore stay in the cache.
@@ -270,7 +301,7 @@ impl<R: Real> CorrectRow<'_, R> {
         for axis in 0..3 {
             let (dt_per_h, inverse) =
                 (V::constant(self.dt_per_h[axis]), V::constant(self.inverse[axis]));
-            let q = here(self.q[axis]) - dt_per_h * (f - lower[axis]);
+            let q = predicted[axis] - dt_per_h * (f - lower[axis]);
             let next = above[axis] - dt_per_h * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);
             if streamed {
@@ -292,14 +323,5 @@ impl<R: Real> CorrectRow<'_, R> {
         partial.rate.include(i, rate);
         partial.square.include(i, square);
         partial.kinetic.add(i, square);
-    }
-}
-
-impl<R: Real> RowWork for CorrectRow<'_, R> {
-    type Number = R;
-    #[inline(always)]
-    fn at<V: Vector<Number = R>>(&mut self, i: usize) {
-        let ur = V::load(&window::<V>(self.q[0], i)[2..]);
-        self.value(i, ur);
     }
 }

@@ -8,28 +8,6 @@ use super::*;
 
 const PERIODIC: Boundaries = Boundaries([[Boundary::Periodic; 2]; 3]);
 
-impl Boundaries {
-    /// Fills the ghost layers of a velocity whose interior and boundary faces are set.
-    fn fill_ghosts<R: Real>(&self, velocity: &mut FaceVector<R>) {
-        let layout = velocity.x.layout();
-        for component in 0..3 {
-            let planes = velocity.component_mut(component);
-            for plane in planes.chunks_exact_mut(layout.plane()) {
-                self.fill_ghosts_of_plane(layout, component, plane);
-            }
-        }
-        self.fill_ghost_planes(velocity);
-    }
-    /// Fills all ghosts of the pressure.
-    fn fill_pressure<R: Real>(&self, pressure: &mut Field<Centre, R>) {
-        let layout = pressure.layout();
-        for plane in pressure.chunks_exact_mut(layout.plane()) {
-            self.fill_pressure_of_plane(layout, plane);
-        }
-        self.fill_pressure_planes(pressure);
-    }
-}
-
 fn params(nu: f64) -> FluidParams {
     FluidParams {
         density: 1.0,
@@ -77,7 +55,7 @@ fn divergence_is_minus_the_transposed_gradient() {
     let mut state = 5;
     let mut p = Field::<Centre>::zeros(&mesh);
     p.iter_mut().for_each(|value| *value = noise(&mut state));
-    flow.boundaries.fill_pressure(&mut p);
+    flow.boundaries.fill_ghosts(mesh.layout(), None, &mut p);
     let mut u = flow.velocity.clone();
     for axis in 0..3 {
         u.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
@@ -188,7 +166,7 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     flow.velocity.x.fill_with(&mesh, |x| exact(0, x, 0.0));
     flow.velocity.y.fill_with(&mesh, |x| exact(1, x, 0.0));
     flow.velocity.z.fill_with(&mesh, |x| exact(2, x, 0.0));
-    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    flow.fill_ghosts();
     for _ in 0..steps {
         flow.predict(dt);
         flow.project(dt);
@@ -252,7 +230,7 @@ fn beltrami(n: usize) -> f64 {
     flow.velocity.x.fill_with(&mesh, |x| x.z.sin() + 0.7 * x.y.cos());
     flow.velocity.y.fill_with(&mesh, |x| 0.8 * x.x.sin() + x.z.cos());
     flow.velocity.z.fill_with(&mesh, |x| 0.7 * x.y.sin() + 0.8 * x.x.cos());
-    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    flow.fill_ghosts();
     let (dt, steps) = (4e-3, 100);
     for _ in 0..steps {
         flow.predict(dt);
@@ -334,7 +312,7 @@ fn decaying_shear(n: usize, axis: usize) -> f64 {
     for m in 1..=n {
         flow.velocity.component_mut(along)[at(m)] = sine(m);
     }
-    flow.boundaries.fill_ghosts(&mut flow.velocity);
+    flow.fill_ghosts();
     let (dt, steps) = (0.05 * h * h, 2 * n * n);
     for _ in 0..steps {
         flow.predict(dt);

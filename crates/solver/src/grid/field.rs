@@ -106,6 +106,10 @@ impl<R: Real> FaceVector<R> {
             self.component_mut(axis).copy_from_slice(other.component(axis));
         }
     }
+    /// Mutable values of all components in memory.
+    pub fn components_mut(&mut self) -> [&mut [R]; 3] {
+        [&mut self.x, &mut self.y, &mut self.z]
+    }
     /// Values of one component in memory.
     #[inline]
     pub fn component(&self, axis: usize) -> &[R] {

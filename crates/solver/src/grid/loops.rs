@@ -57,32 +57,17 @@ pub fn for_slabs<const N: usize, R: Send>(
 
 /// Neighbouring columns through all planes of a list.
 pub struct Columns<'a, R> {
-    range: Range<usize>,
-    start: *mut R,
+    /// Positions of the columns in a plane.
+    pub range: Range<usize>,
+    list: SharedRows<'a, R>,
     stride: usize,
-    planes: usize,
-    borrow: PhantomData<&'a mut [R]>,
 }
 
-// SAFETY: `columns_of` makes disjoint blocks, so each acts as an exclusive borrow of its entries,
-// which may move to another thread if they may.
-unsafe impl<R: Send> Send for Columns<'_, R> {}
-
 impl<R> Columns<'_, R> {
-    /// Positions of the columns in a plane.
-    pub fn range(&self) -> Range<usize> {
-        self.range.clone()
-    }
     /// Entries of the columns in plane `k`, counted from 0.
     #[inline(always)]
     pub fn row(&mut self, k: usize) -> &mut [R] {
-        assert!(k < self.planes);
-        // SAFETY: `columns_of` makes disjoint blocks inside the planes, and the result borrows
-        // `self` as a whole.
-        unsafe {
-            let row = self.start.add(k * self.stride + self.range.start);
-            std::slice::from_raw_parts_mut(row, self.range.len())
-        }
+        self.list.row_mut(k * self.stride + self.range.start, self.range.len())
     }
 }
 
@@ -95,13 +80,11 @@ pub fn columns_of<R>(
     width: usize,
 ) -> Vec<Columns<'_, R>> {
     assert!(len <= stride, "columns lie within a plane");
-    let (start, planes) = (values.as_mut_ptr(), values.len() / stride);
-    let block = |first: usize| Columns {
-        range: first..len.min(first + width),
-        start,
-        stride,
-        planes,
-        borrow: PhantomData,
+    let list = SharedRows::new(0, values);
+    let block = |first: usize| {
+        // SAFETY: the blocks have no column in common, and columns lie within a plane.
+        let list = unsafe { list.alias() };
+        Columns { range: first..len.min(first + width), list, stride }
     };
     (0..len).step_by(width).map(block).collect()
 }

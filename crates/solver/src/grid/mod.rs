@@ -146,6 +146,20 @@ impl Layout {
     pub fn row_of_mut<'a, T>(&self, plane: &'a mut [T], j: usize) -> &'a mut [T] {
         &mut plane[j * self.row()..][..self.cells[0] + 2]
     }
+    /// Row `j` of three planes.
+    #[inline(always)]
+    pub fn rows_of<'a, T>(&self, [x, y, z]: [&'a [T]; 3], j: usize) -> [&'a [T]; 3] {
+        [self.row_of(x, j), self.row_of(y, j), self.row_of(z, j)]
+    }
+    /// Mutable row `j` of three planes.
+    #[inline(always)]
+    pub fn rows_of_mut<'a, T>(
+        &self,
+        [x, y, z]: &'a mut [&mut [T]; 3],
+        j: usize,
+    ) -> [&'a mut [T]; 3] {
+        [self.row_of_mut(x, j), self.row_of_mut(y, j), self.row_of_mut(z, j)]
+    }
     /// Distance in memory between neighbours along each axis.
     #[inline]
     pub fn strides(&self) -> [usize; 3] {

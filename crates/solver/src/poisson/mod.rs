@@ -120,16 +120,15 @@ impl<R: Real> Poisson<R> {
 
         let forward = Stopwatch::start();
         let (system, eigenvalues) = (self.along_z, &self.eigenvalues);
-        let width = self.columns[0].width();
+        let width = self.columns[0].carry.len();
         let blocks = columns_of(&mut self.modes, stride, eigenvalues.len(), width);
         let blocks_of_slot = blocks.len().div_ceil(self.columns.len());
         let blocks = blocks.into_par_iter().chunks(blocks_of_slot);
         self.columns.par_iter_mut().zip(blocks).for_each(|(scratch, blocks)| {
             for mut columns in blocks {
-                let range = columns.range();
-                let singular = range.start == 0 && eigenvalues[0] == 0.0;
-                let (columns, lambda) = (&mut columns, &eigenvalues[range]);
-                dispatch(Solve { system, columns, lambda, singular, scratch });
+                let singular = columns.range.start == 0 && eigenvalues[0] == 0.0;
+                let lambda = &eigenvalues[columns.range.clone()];
+                dispatch(Solve { system, columns: &mut columns, lambda, singular, scratch });
             }
         });
 

@@ -8,8 +8,6 @@
 //!
 //! Legend: L count of numbers in a cache line.
 
-use std::marker::PhantomData;
-
 use super::axis::{AxisTransform, transform_lines};
 use crate::math::{Aligned, Real};
 use grainwake_simd::{Complex, Kernel, MAX_LANES, Vector, as_complex, dispatch};
@@ -89,7 +87,8 @@ impl<R: Real> Plane<R> {
             self.transform(along_x, block, direction, buffers);
         }
         if non_temporal {
-            dispatch(Fence(PhantomData::<R>));
+            // The modes are complete before another thread reads them.
+            R::Baseline::fence();
         }
     }
 
@@ -151,17 +150,6 @@ enum Direction<'a, R> {
     InverseX(&'a [R]),
     /// Modes along y to cells, in place.
     InverseY,
-}
-
-/// Orders the non-temporal stores of a plane before all later stores.
-struct Fence<R>(PhantomData<R>);
-
-impl<R: Real> Kernel for Fence<R> {
-    type Number = R;
-    #[inline(always)]
-    fn run<V: Vector<Number = R>>(self) {
-        V::fence();
-    }
 }
 
 /// Transform of one block of lines.

@@ -29,13 +29,6 @@ pub struct ColumnScratch {
     pub mean: [Vec<f64>; 2],
 }
 
-impl ColumnScratch {
-    /// Number of columns that fit.
-    pub fn width(&self) -> usize {
-        self.carry.len()
-    }
-}
-
 /// Tridiagonal systems along z, one for each pair of modes along x and y.
 #[derive(Clone, Copy)]
 pub struct Tridiagonal {
