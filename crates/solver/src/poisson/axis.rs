@@ -95,7 +95,7 @@ impl<R: Real> TransformLines<'_, R> {
     #[inline(always)]
     fn transform<V: Vector<Number = R>>(self) {
         let axis = self.axis;
-        let (a, b) = as_complex::<V>(self.buffers).split_at_mut(axis.fourier.buffer_len());
+        let (a, b) = as_complex::<V>(self.buffers).split_at_mut(axis.fourier.fft.len);
         let first = a.as_ptr();
         if self.inverse {
             axis.join(&mut a[..axis.n]);
@@ -122,7 +122,7 @@ pub fn transform_lines<'a, V: Vector<Number: Real>>(
     let mut second = false;
     let half = 2 * V::WIDTH == V::Number::LANES;
     dispatch(TransformLines { axis, buffers: &mut *buffers, inverse, half, second: &mut second });
-    let start = if second { axis.fourier.buffer_len() } else { 0 };
+    let start = if second { axis.fourier.fft.len } else { 0 };
     &as_complex::<V>(buffers)[start..][..axis.n]
 }
 
@@ -151,10 +151,6 @@ pub struct Chirp<R> {
 }
 
 impl<R: Real> Fourier<R> {
-    /// Length of each of the two buffers.
-    pub fn buffer_len(&self) -> usize {
-        self.fft.len
-    }
     /// Transforms the first entries of `a`, using both buffers; returns the one with the result,
     /// then the other.
     #[inline(always)]

@@ -35,7 +35,7 @@ pub struct Pass<R> {
 
 /// Planned transform.
 pub struct Fft<R> {
-    /// Number of points.
+    /// Number of points, the length of each buffer.
     pub len: usize,
     /// Passes in order.
     pub passes: Vec<Pass<R>>,
@@ -71,9 +71,7 @@ fn step<V: Vector, const R: usize>(
     pass: &Pass<V::Number>,
     source: &[Complex<V>],
     target: &mut [Complex<V>],
-) where
-    Short: Butterfly<R>,
-{
+) {
     let (stride, span) = (pass.stride, pass.blocks * pass.stride);
     let mut from: [&[Complex<V>]; R] = [&[]; R];
     for t in 0..R {
@@ -129,15 +127,12 @@ fn cut<T, const R: usize>(mut rest: &mut [T], len: usize) -> [&mut [T]; R] {
 
 /// Transform of entry `q` of each of the `R` slices.
 #[inline(always)]
-fn butterfly<V: Vector, const R: usize>(from: &[&[Complex<V>]; R], q: usize) -> [Complex<V>; R]
-where
-    Short: Butterfly<R>,
-{
+fn butterfly<V: Vector, const R: usize>(from: &[&[Complex<V>]; R], q: usize) -> [Complex<V>; R] {
     let mut x = [Complex::zero(); R];
     for t in 0..R {
         x[t] = from[t][q];
     }
-    Short::apply(x)
+    short(x)
 }
 
 /// Pass of any odd prime radix; `source` is overwritten.
@@ -182,74 +177,49 @@ fn prime_step<V: Vector>(
     }
 }
 
-/// Fourier transform of fixed length `R`.
-trait Butterfly<const R: usize> {
-    /// Returns X_k = sum over t of x_t exp(-2 pi i k t / R).
-    fn apply<V: Vector>(x: [Complex<V>; R]) -> [Complex<V>; R];
+/// Transform of length `R` = 2, 3, 4, 5, 7 or 8: X_k = sum over t of x_t exp(-2 pi i k t / R).
+#[inline(always)]
+fn short<V: Vector, const R: usize>(x: [Complex<V>; R]) -> [Complex<V>; R] {
+    let mut y = x;
+    match R {
+        2 => (y[0], y[1]) = (x[0] + x[1], x[0] - x[1]),
+        3 => return odd_butterfly(x, [[-0.5, 0.866_025_403_784_438_6]]),
+        4 => y.copy_from_slice(&four([x[0], x[1], x[2], x[3]])),
+        5 => {
+            let roots = [
+                [0.309_016_994_374_947_45, 0.951_056_516_295_153_5],
+                [-0.809_016_994_374_947_5, 0.587_785_252_292_473_1],
+            ];
+            return odd_butterfly(x, roots);
+        }
+        7 => {
+            let roots = [
+                [0.623_489_801_858_733_6, 0.781_831_482_468_029_8],
+                [-0.222_520_933_956_314_34, 0.974_927_912_181_823_6],
+                [-0.900_968_867_902_419_1, 0.433_883_739_117_558_1],
+            ];
+            return odd_butterfly(x, roots);
+        }
+        _ => {
+            // Transforms of length four of the even and of the odd inputs.
+            let [p, q, r, s] = four([x[0], x[2], x[4], x[6]]);
+            let [t, u, v, w] = four([x[1], x[3], x[5], x[7]]);
+            let half = V::Number::of(FRAC_1_SQRT_2);
+            // Times exp(-i pi / 4) and exp(-3 i pi / 4).
+            let u = Complex { re: u.re + u.im, im: u.im - u.re }.scale(half);
+            let w = Complex { re: w.im - w.re, im: V::constant(0.0) - (w.re + w.im) }.scale(half);
+            let [y2, y6] = rotated_butterfly(r, v);
+            y.copy_from_slice(&[p + t, q + u, y2, s + w, p - t, q - u, y6, s - w]);
+        }
+    }
+    y
 }
 
-/// Transforms of the lengths 2, 3, 4, 5, 7 and 8.
-struct Short;
-
-impl Butterfly<2> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>([a, b]: [Complex<V>; 2]) -> [Complex<V>; 2] {
-        [a + b, a - b]
-    }
-}
-
-impl Butterfly<3> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>(x: [Complex<V>; 3]) -> [Complex<V>; 3] {
-        odd_butterfly(x, [[-0.5, 0.866_025_403_784_438_6]])
-    }
-}
-
-impl Butterfly<4> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
-        let (s, t, u) = (a + c, a - c, b + d);
-        let [y, z] = rotated_butterfly(t, b - d);
-        [s + u, y, s - u, z]
-    }
-}
-
-impl Butterfly<5> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>(x: [Complex<V>; 5]) -> [Complex<V>; 5] {
-        let roots = [
-            [0.309_016_994_374_947_45, 0.951_056_516_295_153_5],
-            [-0.809_016_994_374_947_5, 0.587_785_252_292_473_1],
-        ];
-        odd_butterfly(x, roots)
-    }
-}
-
-impl Butterfly<7> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>(x: [Complex<V>; 7]) -> [Complex<V>; 7] {
-        let roots = [
-            [0.623_489_801_858_733_6, 0.781_831_482_468_029_8],
-            [-0.222_520_933_956_314_34, 0.974_927_912_181_823_6],
-            [-0.900_968_867_902_419_1, 0.433_883_739_117_558_1],
-        ];
-        odd_butterfly(x, roots)
-    }
-}
-
-impl Butterfly<8> for Short {
-    #[inline(always)]
-    fn apply<V: Vector>([a, b, c, d, e, f, g, h]: [Complex<V>; 8]) -> [Complex<V>; 8] {
-        // Transforms of length four of the even and of the odd inputs.
-        let [p, q, r, s] = <Short as Butterfly<4>>::apply([a, c, e, g]);
-        let [t, u, v, w] = <Short as Butterfly<4>>::apply([b, d, f, h]);
-        let half = V::Number::of(FRAC_1_SQRT_2);
-        // Times exp(-i pi / 4) and exp(-3 i pi / 4).
-        let u = Complex { re: u.re + u.im, im: u.im - u.re }.scale(half);
-        let w = Complex { re: w.im - w.re, im: V::constant(0.0) - (w.re + w.im) }.scale(half);
-        let [y2, y6] = rotated_butterfly(r, v);
-        [p + t, q + u, y2, s + w, p - t, q - u, y6, s - w]
-    }
+#[inline(always)]
+fn four<V: Vector>([a, b, c, d]: [Complex<V>; 4]) -> [Complex<V>; 4] {
+    let (s, t, u) = (a + c, a - c, b + d);
+    let [y, z] = rotated_butterfly(t, b - d);
+    [s + u, y, s - u, z]
 }
 
 /// Transform of an odd length `R` = 2 `H` + 1; `roots` has the cosine and sine of 2 pi n / `R`,

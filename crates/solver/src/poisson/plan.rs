@@ -26,7 +26,7 @@ impl<R: Real> Poisson<R> {
         let [nx, ny, nz] = mesh.cells;
         let axes = [0, 1].map(|a| AxisTransform::new(mesh.cells[a], ends[a], mesh.spacing[a]));
         let layout = PlaneLayout::new::<R>(nx, ny);
-        let buffers = axes[0].fourier.buffer_len().max(axes[1].fourier.buffer_len());
+        let buffers = axes[0].fourier.fft.len.max(axes[1].fourier.fft.len);
         let slot = || Slot {
             planes: [(); 3].map(|()| Plane::new(layout)),
             buffers: Aligned::zeros(4 * R::LANES * buffers),

@@ -184,7 +184,7 @@ impl<R: Real> TransformBlock<'_, R> {
     fn transform<V: Vector<Number = R>>(mut self) {
         let TransformBlock { axis, layout, first, second, .. } = self;
         let PlaneLayout { nx, line, pitch, .. } = layout;
-        let len = axis.fourier.buffer_len();
+        let len = axis.fourier.fft.len;
         let buffers = &mut self.buffers[..4 * V::WIDTH * len];
         for lane in (0..second).step_by(V::WIDTH) {
             let cells = Lines { at: pitch + line + first + lane, step: pitch, second };

@@ -182,7 +182,7 @@ fn transforms_of_every_length_match_their_definition() {
         let given: Vec<[f64; 2]> =
             (0..n).map(|t| [(1.3 * t as f64).sin(), (0.7 * (t * t) as f64).cos()]).collect();
         let plan = axis::Fourier::new(n);
-        let len = plan.buffer_len();
+        let len = plan.fft.len;
         let lanes = |values: &[f64]| {
             let mut a = vec![Complex::<Scalar<f64>>::zero(); len];
             for (a, value) in a.iter_mut().zip(values.chunks(2)) {
