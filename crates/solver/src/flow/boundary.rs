@@ -82,20 +82,15 @@ impl Boundaries {
             if self.is_periodic(axis) {
                 layout.wrap(normal, axis);
             }
-            for (face, value) in self.prescribed_faces(axis, layout.cells[axis]) {
-                layout.map_layer(normal, axis, face, face, |_| R::of(value));
-            }
+            self.set_prescribed(layout, axis, normal);
         }
     }
 
-    /// Sets the normal velocity on the prescribed x and y faces of one plane.
-    pub(crate) fn set_normal_of_plane<R: Real>(&self, layout: Layout, [x, y]: [&mut [R]; 2]) {
-        let row = layout.row();
-        for (face, value) in self.prescribed_faces(0, layout.cells[0]) {
-            x.chunks_exact_mut(row).for_each(|row| row[face] = R::of(value));
-        }
-        for (face, value) in self.prescribed_faces(1, layout.cells[1]) {
-            y[face * row..(face + 1) * row].fill(R::of(value));
+    /// Sets the prescribed velocity on the faces normal to `axis` of a field, or of a plane for x
+    /// and y.
+    pub(crate) fn set_prescribed<R: Real>(&self, layout: Layout, axis: usize, normal: &mut [R]) {
+        for (face, value) in self.prescribed_faces(axis, layout.cells[axis]) {
+            layout.map_layer(normal, axis, face, face, |_| R::of(value));
         }
     }
 

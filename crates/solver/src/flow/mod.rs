@@ -185,11 +185,10 @@ impl<R: Real> Flow<R> {
                 predicted: [&mut *px, &mut *py, pz],
                 sum: &mut partial.tendency,
             });
-            boundaries.set_normal_of_plane(layout, [px, py]);
+            boundaries.set_prescribed(layout, 0, px);
+            boundaries.set_prescribed(layout, 1, py);
         });
-        for (face, value) in boundaries.prescribed_faces(2, layout.cells[2]) {
-            self.predicted.z[face * layout.plane()..][..layout.plane()].fill(R::of(value));
-        }
+        boundaries.set_prescribed(layout, 2, &mut self.predicted.z);
         let sum = self.partial.iter().fold(DVec3::ZERO, |sum, plane| sum + plane.tendency);
         let [_, _, _, x, y, z] = self.tendency_sums;
         self.tendency_sums = [x, y, z, sum.x, sum.y, sum.z];

@@ -81,11 +81,11 @@ impl<R: Real> NestedFlow<R> {
                 let (of_old, fields) = old.as_ref()?;
                 Some(fields[field][of_old.common_entry(&nesting, component, is_velocity, at)?])
             };
-            if is_velocity {
-                nesting.copy(component, to, kept);
-            } else {
-                nesting.interpolate(component, from, to, kept);
-            }
+            let interpolated = nesting.interpolated(component, from);
+            nesting.for_entries(component, to, |at, value| {
+                let new = |old: R| if is_velocity { old } else { interpolated(at) };
+                *value = kept(at).unwrap_or_else(|| new(*value));
+            });
         }
         let is_new = |c: [usize; 3]| {
             let at = c.map(|c| RATIO * c + 1);

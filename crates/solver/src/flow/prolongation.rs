@@ -63,7 +63,7 @@ impl Nesting {
 
     /// Calls `f(at, value)` for the entries of a refined field, in parallel; `component` is that of
     /// a field on faces, which includes the upper side.
-    fn for_entries<R: Real>(
+    pub fn for_entries<R: Real>(
         &self,
         component: Option<usize>,
         field: &mut [R],
@@ -80,28 +80,16 @@ impl Nesting {
         });
     }
 
-    /// Gives the entries of a refined field the values `kept`, if there are any.
-    pub fn copy<R: Real>(
-        &self,
-        component: Option<usize>,
-        to: &mut [R],
-        kept: impl Fn([usize; 3]) -> Option<R> + Sync,
-    ) {
-        self.for_entries(component, to, |at, value| *value = kept(at).unwrap_or(*value));
-    }
-
-    /// Gives the entries of a refined field the values `kept`, and the others values by linear
-    /// interpolation. At walls and open sides of the whole box the nearest values inside are
-    /// extrapolated, because the tendency has no ghosts and the pressure has no slope there.
-    pub fn interpolate<R: Real>(
+    /// Value at each entry of a refined field by linear interpolation. At walls and open sides of
+    /// the whole box the nearest values inside are extrapolated, because the tendency has no ghosts
+    /// and the pressure has no slope there.
+    pub fn interpolated<R: Real>(
         &self,
         component: Option<usize>,
         from: &[R],
-        to: &mut [R],
-        kept: impl Fn([usize; 3]) -> Option<R> + Sync,
-    ) {
+    ) -> impl Fn([usize; 3]) -> R {
         let pairs = [0, 1, 2].map(|axis| self.interpolation(axis, component == Some(axis), true));
-        let interpolated = |[i, j, k]: [usize; 3]| {
+        move |[i, j, k]| {
             let mut sum = 0.0;
             for (z, by_z) in pairs[2][k - 1] {
                 for (y, by_y) in pairs[1][j - 1] {
@@ -111,10 +99,7 @@ impl Nesting {
                 }
             }
             R::of(sum)
-        };
-        self.for_entries(component, to, |at, value| {
-            *value = kept(at).unwrap_or_else(|| interpolated(at));
-        });
+        }
     }
 
     /// Normal velocities of the four refined faces on the lower face of cell `c` along `axis`, by

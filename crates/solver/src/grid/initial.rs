@@ -35,6 +35,7 @@ impl Layout {
         self.map_layer(values, axis, 1, n + 1, |value| value);
     }
     /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
+    /// `values` are a field, or a plane for the axes x and y.
     pub fn map_layer<T: Copy>(
         &self,
         values: &mut [T],
@@ -45,11 +46,13 @@ impl Layout {
     ) {
         let [_, row, plane] = self.strides();
         let shift = (from as isize - to as isize) * self.strides()[axis] as isize;
+        let len = values.len();
         let mut set = |at: usize| values[at] = f(values[at.wrapping_add_signed(shift)]);
         match axis {
-            0 => (0..self.len() / row).for_each(|line| set(line * row + to)),
-            1 => (0..self.len() / plane)
-                .for_each(|k| (0..row).for_each(|i| set(k * plane + to * row + i))),
+            0 => (0..len / row).for_each(|line| set(line * row + to)),
+            1 => {
+                (0..len / plane).for_each(|k| (0..row).for_each(|i| set(k * plane + to * row + i)))
+            }
             _ => (0..plane).for_each(|at| set(to * plane + at)),
         }
     }

@@ -59,28 +59,29 @@ pub struct Solve<'a, 'b, R> {
 impl<R: Real> Kernel for Solve<'_, '_, R> {
     type Number = f64;
     #[inline(always)]
-    fn run<V: Vector<Number = f64>>(self) {
-        let Solve { system, columns, lambda, singular, scratch } = self;
-        for rows in [&mut scratch.values, &mut scratch.pivots, &mut scratch.corner] {
-            rows.iter_mut().take(lambda.len()).for_each(|first| *first = 0.0);
+    fn run<V: Vector<Number = f64>>(mut self) {
+        let Solve { system, singular, .. } = self;
+        let ColumnScratch { values, pivots, corner, .. } = &mut *self.scratch;
+        for rows in [values, pivots, corner] {
+            rows.iter_mut().take(self.lambda.len()).for_each(|first| *first = 0.0);
         }
         match system.ends {
-            _ if system.n == 1 => system.solve_flat(columns, lambda),
-            Ends::Neumann => system.solve_neumann::<V, R>(columns, lambda, singular, scratch),
+            _ if system.n == 1 => self.solve_flat(),
+            Ends::Neumann => self.solve_neumann::<V>(),
             Ends::Periodic => {
                 if singular {
                     for k in 0..system.n {
-                        scratch.mean[0][k] = columns.row(k)[0].wide();
+                        self.scratch.mean[0][k] = self.columns.row(k)[0].wide();
                     }
                 }
-                system.solve_periodic::<V, R>(columns, lambda, scratch);
+                self.solve_periodic::<V>();
                 if singular {
-                    system.solve_mean(columns, &mut scratch.mean);
+                    self.solve_mean();
                 }
             }
         }
         if singular {
-            system.subtract_mean(columns);
+            self.subtract_mean();
         }
     }
 }
@@ -97,26 +98,23 @@ fn rows_at(values: &mut [f64], k: usize, width: usize) -> (&mut [f64], &mut [f64
     values[k * width..][..2 * width].split_at_mut(width)
 }
 
-impl Tridiagonal {
+impl<R: Real> Solve<'_, '_, R> {
     #[inline(always)]
-    fn solve_flat<R: Real>(&self, columns: &mut Columns<R>, lambda: &[f64]) {
-        for (value, lambda) in columns.row(0).iter_mut().zip(lambda) {
-            *value = R::of(if *lambda == 0.0 { 0.0 } else { -self.scale * value.wide() / lambda });
+    fn solve_flat(&mut self) {
+        let scale = self.system.scale;
+        for (value, lambda) in self.columns.row(0).iter_mut().zip(self.lambda) {
+            *value = R::of(if *lambda == 0.0 { 0.0 } else { -scale * value.wide() / lambda });
         }
     }
 
     #[inline(always)]
-    fn solve_neumann<V: Vector<Number = f64>, R: Real>(
-        &self,
-        columns: &mut Columns<R>,
-        lambda: &[f64],
-        singular: bool,
-        scratch: &mut ColumnScratch,
-    ) {
-        let (n, width) = (self.n, lambda.len());
-        let (one, square) = (V::constant(1.0), V::constant(self.square));
-        let factor = V::constant(-self.square * self.scale);
-        let ColumnScratch { values, pivots, carry, .. } = scratch;
+    fn solve_neumann<V: Vector<Number = f64>>(&mut self) {
+        let Tridiagonal { n, square, scale, .. } = self.system;
+        let (columns, lambda) = (&mut *self.columns, self.lambda);
+        let ColumnScratch { values, pivots, carry, .. } = &mut *self.scratch;
+        let width = lambda.len();
+        let (one, factor) = (V::constant(1.0), V::constant(-square * scale));
+        let square = V::constant(square);
         for k in 0..n {
             let neighbours = u8::from(k > 0) + u8::from(k + 1 < n);
             let neighbours = V::constant(f64::from(neighbours));
@@ -131,7 +129,7 @@ impl Tridiagonal {
                 (f * pivot).store(&mut values[i..]);
             }
         }
-        if singular {
+        if self.singular {
             // The last pivot of the mean mode vanishes; its last value is zero for the time being.
             values[n * width] = 0.0;
         }
@@ -153,16 +151,13 @@ impl Tridiagonal {
     }
 
     #[inline(always)]
-    fn solve_periodic<V: Vector<Number = f64>, R: Real>(
-        &self,
-        columns: &mut Columns<R>,
-        lambda: &[f64],
-        scratch: &mut ColumnScratch,
-    ) {
-        let (n, width) = (self.n, lambda.len());
+    fn solve_periodic<V: Vector<Number = f64>>(&mut self) {
+        let Tridiagonal { n, square, scale, .. } = self.system;
+        let (columns, lambda) = (&mut *self.columns, self.lambda);
+        let ColumnScratch { values, pivots, corner, carry, .. } = &mut *self.scratch;
+        let width = lambda.len();
         let (one, two, zero) = (V::constant(1.0), V::constant(2.0), V::constant(0.0));
-        let (square, factor) = (V::constant(self.square), V::constant(-self.square * self.scale));
-        let ColumnScratch { values, pivots, corner, carry, .. } = scratch;
+        let (square, factor) = (V::constant(square), V::constant(-square * scale));
         // A = T + u v^T with u = (g, 0.., -1), v = (1, 0.., -1/g), g = -b.
         for k in 0..n {
             let row = &columns.row(k)[..width];
@@ -219,19 +214,21 @@ impl Tridiagonal {
     }
 
     /// Makes the mean of the first column zero.
-    fn subtract_mean<R: Real>(&self, columns: &mut Columns<R>) {
-        let sum: f64 = (0..self.n).map(|k| columns.row(k)[0].wide()).sum();
-        let mean = sum / self.n as f64;
-        for k in 0..self.n {
-            let value = &mut columns.row(k)[0];
+    fn subtract_mean(&mut self) {
+        let n = self.system.n;
+        let sum: f64 = (0..n).map(|k| self.columns.row(k)[0].wide()).sum();
+        let mean = sum / n as f64;
+        for k in 0..n {
+            let value = &mut self.columns.row(k)[0];
             *value = R::of(value.wide() - mean);
         }
     }
 
     /// Solves the mean mode of a periodic axis with the first value zero.
     #[inline(always)]
-    fn solve_mean<R: Real>(&self, columns: &mut Columns<R>, [f, pivots]: &mut [Vec<f64>; 2]) {
-        let (n, factor) = (self.n, -self.square * self.scale);
+    fn solve_mean(&mut self) {
+        let Tridiagonal { n, square, scale, .. } = self.system;
+        let ([f, pivots], factor) = (&mut self.scratch.mean, -square * scale);
         let (mut pivot, mut y) = (0.0, 0.0);
         for k in 1..n {
             pivot = 1.0 / (2.0 - pivot);
@@ -239,11 +236,11 @@ impl Tridiagonal {
             pivots[k] = pivot;
             f[k] = y;
         }
-        columns.row(0)[0] = R::default();
+        self.columns.row(0)[0] = R::default();
         y = 0.0;
         for k in (1..n).rev() {
             y = f[k] + pivots[k] * y;
-            columns.row(k)[0] = R::of(y);
+            self.columns.row(k)[0] = R::of(y);
         }
     }
 }
