@@ -325,6 +325,6 @@ impl<R: Real> Flow<R> {
     }
     /// Time spent in each stage of the Poisson solves, divergence and correction included.
     pub fn poisson_times(&self) -> PoissonTimes {
-        self.poisson.times()
+        self.poisson.times
     }
 }

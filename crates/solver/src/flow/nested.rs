@@ -125,9 +125,9 @@ impl<R: Real> NestedFlow<R> {
         let refined = flow.project(dt);
         for axis in 0..3 {
             let (from, to) = (flow.velocity.component(axis), whole.velocity.component_mut(axis));
-            let gain = nesting.average_faces(axis, from, to);
-            measures.momentum[axis] += gain.momentum;
-            measures.kinetic_energy += gain.energy;
+            let [momentum, energy] = nesting.average_faces(axis, from, to);
+            measures.momentum[axis] += momentum;
+            measures.kinetic_energy += energy;
         }
         nesting.average_cells(&mut flow.pressure, &mut whole.pressure);
         whole.fill_ghosts();

@@ -82,6 +82,7 @@ impl<'a, R: Real> FacePlanes<'a, R> {
             vp: layout.row_of(self.lower[1], next(j, ny, self.periodic[1])),
             wt: layout.row_of(self.above, j),
             wrapped: if self.periodic[0] { n } else { 0 },
+            inverse: self.inverse,
         }
     }
 
@@ -114,6 +115,7 @@ struct FaceRows<'a, R> {
     wt: &'a [R],
     /// Last cell of a periodic row, else 0.
     wrapped: usize,
+    inverse: [f64; 3],
 }
 
 impl<R: Real> FaceRows<'_, R> {
@@ -150,8 +152,7 @@ impl<R: Real> Kernel for Divergence<'_, R> {
         let [n, ny, _] = faces.layout.cells;
         for j in 1..=ny {
             let out = &mut out.row_mut(j)[..n + 2];
-            let inverse = faces.inverse;
-            faces.along_row::<V>(&mut DivergenceRow { faces: faces.row(j), inverse, dt, out });
+            faces.along_row::<V>(&mut DivergenceRow { faces: faces.row(j), dt, out });
         }
     }
 }
@@ -159,7 +160,6 @@ impl<R: Real> Kernel for Divergence<'_, R> {
 /// One row of cells.
 struct DivergenceRow<'a, R> {
     faces: FaceRows<'a, R>,
-    inverse: [f64; 3],
     dt: f64,
     out: &'a mut [R],
 }
@@ -169,7 +169,7 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
     #[inline(always)]
     fn at<V: Vector<Number = R>>(&mut self, i: usize) {
         let [[u, v, w], [ur, vp, wt]] = self.faces.load::<V>(i);
-        let [x, y, z] = self.inverse.map(V::constant);
+        let [x, y, z] = self.faces.inverse.map(V::constant);
         let sum = (ur - u) * x + (vp - v) * y + (wt - w) * z;
         sum.div(V::constant(self.dt)).store(window_mut::<V>(self.out, i));
     }
@@ -214,7 +214,6 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 f: &f.row(j)[..n + 2],
                 lower: [&f.row(j - 1)[..n + 2], &fb.row(j)[..n + 2]],
                 upper: [&f.row(j + 1)[..n + 2], &ft.row(j)[..n + 2]],
-                inverse,
                 dt_per_h: inverse.map(|inverse| self.dt * inverse),
                 out,
                 pressure: layout.row_of_mut(p, j),
@@ -272,7 +271,6 @@ struct CorrectRow<'a, R> {
     /// Increment one row down in y and in z, and one row up.
     lower: [&'a [R]; 2],
     upper: [&'a [R]; 2],
-    inverse: [f64; 3],
     dt_per_h: [f64; 3],
     out: [&'a mut [R]; 3],
     pressure: &'a mut [R],
@@ -300,7 +298,7 @@ impl<R: Real> RowWork for CorrectRow<'_, R> {
         let streamed = self.streamed.contains(&i);
         for axis in 0..3 {
             let (dt_per_h, inverse) =
-                (V::constant(self.dt_per_h[axis]), V::constant(self.inverse[axis]));
+                (V::constant(self.dt_per_h[axis]), V::constant(self.faces.inverse[axis]));
             let q = predicted[axis] - dt_per_h * (f - lower[axis]);
             let next = above[axis] - dt_per_h * (upper[axis] - f);
             let to = window_mut::<V>(self.out[axis], i);

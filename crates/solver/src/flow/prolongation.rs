@@ -102,27 +102,6 @@ impl Nesting {
         }
     }
 
-    /// Normal velocities of the four refined faces on the lower face of cell `c` along `axis`, by
-    /// lower and upper half along the two axes after it. They are linear in the position and have
-    /// the flux of the face.
-    fn quarters<R: Real>(&self, axis: usize, from: &FaceVector<R>, c: [usize; 3]) -> [[f64; 2]; 2] {
-        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-        let value = |da: isize, db: isize| {
-            let mut at = [0; 3];
-            at[axis] = self.position(axis, c[axis] as isize);
-            at[a] = self.position(a, c[a] as isize + da);
-            at[b] = self.position(b, c[b] as isize + db);
-            from.component(axis)[self.whole.index(at[0], at[1], at[2])].wide()
-        };
-        let mean = value(0, 0);
-        let along_a = 0.125 * (value(1, 0) - value(-1, 0));
-        let along_b = 0.125 * (value(0, 1) - value(0, -1));
-        [
-            [mean - along_a - along_b, mean - along_a + along_b],
-            [mean + along_a - along_b, mean + along_a + along_b],
-        ]
-    }
-
     /// Position in memory of the refined face `half` along the two axes after `axis` on the lower
     /// face of cell `c`.
     fn quarter_position(&self, axis: usize, c: [usize; 3], half: [usize; 2]) -> usize {
@@ -145,7 +124,9 @@ impl Nesting {
         }
     }
 
-    /// Sets the refined faces on the lower face of cell `c` and returns their values.
+    /// Sets the normal velocities of the four refined faces on the lower face of cell `c` along
+    /// `axis`: linear in the position, with the flux of the face. Returns them by lower and upper
+    /// half along the two axes after it.
     fn set_quarters<R: Real>(
         &self,
         axis: usize,
@@ -153,7 +134,21 @@ impl Nesting {
         to: &mut FaceVector<R>,
         c: [usize; 3],
     ) -> [[f64; 2]; 2] {
-        let values = self.quarters(axis, from, c);
+        let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+        let value = |da: isize, db: isize| {
+            let mut at = [0; 3];
+            at[axis] = self.position(axis, c[axis] as isize);
+            at[a] = self.position(a, c[a] as isize + da);
+            at[b] = self.position(b, c[b] as isize + db);
+            from.component(axis)[self.whole.index(at[0], at[1], at[2])].wide()
+        };
+        let mean = value(0, 0);
+        let along_a = 0.125 * (value(1, 0) - value(-1, 0));
+        let along_b = 0.125 * (value(0, 1) - value(0, -1));
+        let values = [
+            [mean - along_a - along_b, mean - along_a + along_b],
+            [mean + along_a - along_b, mean + along_a + along_b],
+        ];
         for half in HALVES {
             let at = self.quarter_position(axis, c, half);
             to.component_mut(axis)[at] = R::of(values[half[0]][half[1]]);
@@ -162,7 +157,7 @@ impl Nesting {
     }
 
     /// Sets the velocity of `to` in the cells of the refined box that `is_new` selects. On the
-    /// faces of the whole grid it is that of [`Self::quarters`]. Inside its cells it is the one by
+    /// faces of the whole grid it is that of [`Self::set_quarters`]. Inside its cells it is the one by
     /// Toth and Roe (2002): all eight refined cells of a cubic cell have its divergence.
     pub fn prolong_velocity<R: Real>(
         &self,

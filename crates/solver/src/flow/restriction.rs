@@ -7,24 +7,15 @@ use rayon::prelude::*;
 use super::nesting::{Nesting, RATIO};
 use crate::math::Real;
 
-/// Momentum per density [m^4/s] and kinetic energy per density [m^5/s^2] that the whole grid has
-/// gained by the transfer of one velocity component.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Gain {
-    /// Momentum along the component.
-    pub momentum: f64,
-    /// Kinetic energy.
-    pub energy: f64,
-}
-
 impl Nesting {
     /// Replaces the values of `to` on the faces inside the refined box by the means over the four
-    /// refined faces on each. Faces on inner sides and walls keep theirs.
-    pub fn average_faces<R: Real>(&self, axis: usize, from: &[R], to: &mut [R]) -> Gain {
+    /// refined faces on each. Faces on inner sides and walls keep theirs. Returns the momentum
+    /// [m^4/s] and the kinetic energy [m^5/s^2] per density that the whole grid gains.
+    pub fn average_faces<R: Real>(&self, axis: usize, from: &[R], to: &mut [R]) -> [f64; 2] {
         let first = [0, 1, 2].map(|along| usize::from(along == axis && !self.spanned[axis]));
         let [a, b] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| self.refined.strides()[axis]);
         let gains = self.for_planes(to, |k, plane| {
-            let mut gain = Gain::default();
+            let mut gain = [0.0; 2];
             if k < first[2] {
                 return gain;
             }
@@ -35,19 +26,15 @@ impl Nesting {
                     let [p, q, r, s] = pairs.map(|pair| pair[0].wide());
                     let mean = R::of(0.25 * ((p + q) + (r + s)));
                     let (old, new) = (row[*x].wide(), mean.wide());
-                    gain.momentum += new - old;
-                    gain.energy += 0.5 * (new * new - old * old);
+                    gain[0] += new - old;
+                    gain[1] += 0.5 * (new * new - old * old);
                     row[*x] = mean;
                 }
             }
             gain
         });
-        let mut total = Gain::default();
-        for gain in gains {
-            total.momentum += self.cell_volume * gain.momentum;
-            total.energy += self.cell_volume * gain.energy;
-        }
-        total
+        let v = self.cell_volume;
+        gains.iter().fold([0.0; 2], |[p, e], [dp, de]| [p + v * dp, e + v * de])
     }
 
     /// Replaces the cells of `to` inside the refined box by the means over the eight refined cells

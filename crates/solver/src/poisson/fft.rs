@@ -20,11 +20,8 @@ pub const TOGETHER: usize = 4;
 
 /// One pass of the transform.
 pub struct Pass<R> {
-    /// Radix r.
     pub radix: usize,
-    /// Number of groups with different twiddle factors.
     pub blocks: usize,
-    /// Product of the radices of the earlier passes.
     pub stride: usize,
     /// Twiddle factors: `radix - 1` for each block.
     pub turn: Vec<[R; 2]>,
@@ -125,16 +122,6 @@ fn cut<T, const R: usize>(mut rest: &mut [T], len: usize) -> [&mut [T]; R] {
     slices
 }
 
-/// Transform of entry `q` of each of the `R` slices.
-#[inline(always)]
-fn butterfly<V: Vector, const R: usize>(from: &[&[Complex<V>]; R], q: usize) -> [Complex<V>; R] {
-    let mut x = [Complex::zero(); R];
-    for t in 0..R {
-        x[t] = from[t][q];
-    }
-    short(x)
-}
-
 /// Pass of any odd prime radix; `source` is overwritten.
 #[inline(always)]
 fn prime_step<V: Vector>(
@@ -177,9 +164,14 @@ fn prime_step<V: Vector>(
     }
 }
 
-/// Transform of length `R` = 2, 3, 4, 5, 7 or 8: X_k = sum over t of x_t exp(-2 pi i k t / R).
+/// Transform of entry `q` of each of `R` = 2, 3, 4, 5, 7 or 8 slices: X_k is the sum over t of
+/// x_t exp(-2 pi i k t / R).
 #[inline(always)]
-fn short<V: Vector, const R: usize>(x: [Complex<V>; R]) -> [Complex<V>; R] {
+fn butterfly<V: Vector, const R: usize>(from: &[&[Complex<V>]; R], q: usize) -> [Complex<V>; R] {
+    let mut x = [Complex::zero(); R];
+    for t in 0..R {
+        x[t] = from[t][q];
+    }
     let mut y = x;
     match R {
         2 => (y[0], y[1]) = (x[0] + x[1], x[0] - x[1]),

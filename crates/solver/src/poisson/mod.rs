@@ -81,7 +81,8 @@ pub struct Poisson<R = f64> {
     eigenvalues: Vec<f64>,
     slots: Vec<Slot<R>>,
     columns: Vec<ColumnScratch>,
-    times: PoissonTimes,
+    /// Time spent in each stage of all solves.
+    pub times: PoissonTimes,
 }
 
 /// Scratch of one range of planes.
@@ -168,11 +169,6 @@ impl<R: Real> Poisson<R> {
         self.times.forward += start.until(&forward);
         self.times.columns += forward.until(&columns);
         self.times.inverse += columns.elapsed();
-    }
-
-    /// Time spent in each stage.
-    pub fn times(&self) -> PoissonTimes {
-        self.times
     }
 }
 

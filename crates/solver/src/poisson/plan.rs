@@ -25,14 +25,16 @@ impl<R: Real> Poisson<R> {
     pub fn new(mesh: &Mesh, ends: [Ends; 3]) -> Poisson<R> {
         let [nx, ny, nz] = mesh.cells;
         let axes = [0, 1].map(|a| AxisTransform::new(mesh.cells[a], ends[a], mesh.spacing[a]));
-        let layout = PlaneLayout::new::<R>(nx, ny);
+        let line = R::LANES;
+        let layout = PlaneLayout { nx, ny, line, pitch: line + nx.next_multiple_of(line) + line };
         let buffers = axes[0].fourier.fft.len.max(axes[1].fourier.fft.len);
+        let plane = || Aligned::zeros(layout.pitch * (layout.lines() + 2));
         let slot = || Slot {
-            planes: [(); 3].map(|()| Plane::new(layout)),
-            buffers: Aligned::zeros(4 * R::LANES * buffers),
+            planes: [(); 3].map(|()| Plane { layout, values: plane() }),
+            buffers: Aligned::zeros(4 * line * buffers),
         };
         // A multiple of two cache lines.
-        let unit = 2 * R::LANES;
+        let unit = 2 * line;
         let width = (CACHE / size_of::<f64>() / 2 / nz / unit * unit).max(unit);
         let width = width.min(layout.modes());
         let blocks = layout.modes().div_ceil(width);
@@ -84,21 +86,6 @@ fn eigenvalues<R: Real>(layout: PlaneLayout, axes: &[AxisTransform<R>; 2], dy: f
         }
     }
     found
-}
-
-impl PlaneLayout {
-    /// Layout of `nx` x `ny` cells.
-    pub fn new<R: Real>(nx: usize, ny: usize) -> PlaneLayout {
-        let line = R::LANES;
-        PlaneLayout { nx, ny, line, pitch: line + nx.next_multiple_of(line) + line }
-    }
-}
-
-impl<R: Real> Plane<R> {
-    /// Plane of zeros.
-    fn new(layout: PlaneLayout) -> Plane<R> {
-        Plane { layout, values: Aligned::zeros(layout.pitch * (layout.lines() + 2)) }
-    }
 }
 
 impl ColumnScratch {
@@ -161,7 +148,10 @@ impl<R: Real> Fourier<R> {
         if factors(n).into_iter().all(|factor| factor <= LARGEST_PRIME) {
             return Fourier { fft: Fft::new(n), chirp: None };
         }
-        let padded = padded(n);
+        // Smallest length with butterflies alone that holds the convolution.
+        let padded = (2 * n - 1..)
+            .find(|len| factors(*len).into_iter().all(|factor| [2, 3, 4, 5, 8].contains(&factor)))
+            .unwrap_or(2 * n);
         // t^2 modulo 2n keeps the angle exact for long lines.
         let chirp: Vec<[f64; 2]> = (0..n).map(|t| root(t * t, 2 * n)).collect();
         let mut kernel = vec![[0.0; 2]; padded];
@@ -184,13 +174,6 @@ impl<R: Real> Fourier<R> {
         let turn = chirp.into_iter().map(|turn| turn.map(R::of)).collect();
         Fourier { fft: Fft::new(padded), chirp: Some(Chirp { turn, spectrum }) }
     }
-}
-
-/// Smallest length with butterflies alone that holds the convolution.
-fn padded(n: usize) -> usize {
-    (2 * n - 1..)
-        .find(|len| factors(*len).into_iter().all(|factor| [2, 3, 4, 5, 8].contains(&factor)))
-        .unwrap_or(2 * n)
 }
 
 impl<R: Real> Fft<R> {

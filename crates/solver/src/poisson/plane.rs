@@ -135,8 +135,7 @@ impl<R: Real> Plane<R> {
         direction: Direction<R>,
         buffers: &mut [R],
     ) {
-        let (layout, values) = (self.layout, &mut *self.values);
-        dispatch(TransformBlock { axis, layout, first, second, direction, values, buffers });
+        dispatch(TransformBlock { axis, plane: self, first, second, direction, buffers });
     }
 }
 
@@ -155,14 +154,12 @@ enum Direction<'a, R> {
 /// Transform of one block of lines.
 struct TransformBlock<'a, R> {
     axis: &'a AxisTransform<R>,
-    layout: PlaneLayout,
+    plane: &'a mut Plane<R>,
     /// First line of the block.
     first: usize,
     /// Number of lines from each first line to its second line, half of the block.
     second: usize,
     direction: Direction<'a, R>,
-    /// Values of the plane of cells.
-    values: &'a mut [R],
     /// Both buffers of the transform, one after the other.
     buffers: &'a mut [R],
 }
@@ -182,8 +179,9 @@ impl<R: Real> Kernel for TransformBlock<'_, R> {
 impl<R: Real> TransformBlock<'_, R> {
     #[inline(always)]
     fn transform<V: Vector<Number = R>>(mut self) {
-        let TransformBlock { axis, layout, first, second, .. } = self;
-        let PlaneLayout { nx, line, pitch, .. } = layout;
+        let TransformBlock { axis, first, second, .. } = self;
+        let PlaneLayout { nx, line, pitch, .. } = self.plane.layout;
+        let values = &mut *self.plane.values;
         let len = axis.fourier.fft.len;
         let buffers = &mut self.buffers[..4 * V::WIDTH * len];
         for lane in (0..second).step_by(V::WIDTH) {
@@ -194,26 +192,25 @@ impl<R: Real> TransformBlock<'_, R> {
             match &self.direction {
                 Direction::ForwardY => {
                     for (i, &to) in axis.order.iter().enumerate() {
-                        a[to] = cells.entry(self.values, i);
+                        a[to] = cells.entry(values, i);
                     }
                 }
-                Direction::ForwardX { .. } => rows.load(&axis.order, self.values, a),
+                Direction::ForwardX { .. } => rows.load(&axis.order, values, a),
                 Direction::InverseX(from) => modes.load(from, &mut a[..axis.n]),
-                Direction::InverseY => cells.load(self.values, &mut a[..axis.n]),
+                Direction::InverseY => cells.load(values, &mut a[..axis.n]),
             }
             let inverse = matches!(self.direction, Direction::InverseX(_) | Direction::InverseY);
             let found = transform_lines::<V>(axis, buffers, inverse);
             match &mut self.direction {
-                Direction::ForwardY => cells.store(found, self.values),
-                // A narrower register would write part of a cache line.
-                Direction::ForwardX { modes: to, non_temporal: true } if V::WIDTH == R::LANES => {
-                    modes.store_non_temporal(found, to);
+                Direction::ForwardY => cells.store(found, values, false),
+                Direction::ForwardX { modes: to, non_temporal } => {
+                    // A narrower register would write part of a cache line.
+                    modes.store(found, to, *non_temporal && V::WIDTH == R::LANES);
                 }
-                Direction::ForwardX { modes: to, .. } => modes.store(found, to),
-                Direction::InverseX(_) => rows.store(&axis.order, found, self.values),
+                Direction::InverseX(_) => rows.store(&axis.order, found, values),
                 Direction::InverseY => {
                     for (i, &from) in axis.order.iter().enumerate() {
-                        cells.set_entry(self.values, i, found[from].swap_parts());
+                        cells.set_entry(values, i, found[from].swap_parts());
                     }
                 }
             }
@@ -250,20 +247,17 @@ impl Lines {
             *x = self.entry(values, i);
         }
     }
-    /// Stores all entries of the lines.
+    /// Stores all entries of the lines, with non-temporal stores if `non_temporal`.
     #[inline(always)]
-    fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
+    fn store<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number], non_temporal: bool) {
         for (i, x) in a.iter().enumerate() {
-            self.set_entry(values, i, *x);
-        }
-    }
-    /// Stores all entries of the lines with non-temporal stores.
-    #[inline(always)]
-    fn store_non_temporal<V: Vector>(&self, a: &[Complex<V>], values: &mut [V::Number]) {
-        for (i, x) in a.iter().enumerate() {
-            let both = &mut values[self.at + i * self.step..][..self.second + V::WIDTH];
-            x.re.store_non_temporal(both);
-            x.im.store_non_temporal(&mut both[self.second..]);
+            if non_temporal {
+                let both = &mut values[self.at + i * self.step..][..self.second + V::WIDTH];
+                x.re.store_non_temporal(both);
+                x.im.store_non_temporal(&mut both[self.second..]);
+            } else {
+                self.set_entry(values, i, *x);
+            }
         }
     }
 }
