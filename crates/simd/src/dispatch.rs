@@ -55,20 +55,16 @@ impl InstructionSet {
 
     /// Widest instruction set of this machine, or the baseline with `--cfg narrow_registers`: the
     /// thread sanitizer ignores accesses of more than 16 bytes.
-    #[cfg(target_arch = "x86_64")]
     pub fn widest() -> InstructionSet {
-        let has_avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
-        if cfg!(narrow_registers) || !has_avx2 {
-            InstructionSet::Baseline
-        } else if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-            InstructionSet::Avx512
-        } else {
-            InstructionSet::Avx2
+        #[cfg(target_arch = "x86_64")]
+        if !cfg!(narrow_registers)
+            && is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+        {
+            let has_avx512 =
+                is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl");
+            return if has_avx512 { InstructionSet::Avx512 } else { InstructionSet::Avx2 };
         }
-    }
-    /// Widest instruction set of this machine.
-    #[cfg(not(target_arch = "x86_64"))]
-    pub fn widest() -> InstructionSet {
         InstructionSet::Baseline
     }
 

@@ -6,6 +6,8 @@
 //! projection must not change it, hence the zero normal gradient of the pressure increment, and of
 //! the pressure.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -94,44 +96,20 @@ impl Boundaries {
         }
     }
 
-    /// Fills all ghosts of a velocity `component`, or of the pressure if none.
+    /// Fills the ghosts along `axes` of a velocity `component`, or of the pressure if none. `values`
+    /// are a field, or whole planes of it for the axes x and y.
     pub(crate) fn fill_ghosts<R: Real>(
         &self,
         layout: Layout,
         component: Option<usize>,
-        field: &mut [R],
+        axes: Range<usize>,
+        values: &mut [R],
     ) {
-        let planes = field.chunks_exact_mut(layout.plane());
-        for plane in planes.skip(1).take(layout.cells[2]) {
-            self.fill_ghosts_of_plane(layout, component, plane);
+        for axis in axes {
+            let rules = self.ghost_rules(axis, component);
+            let part = if axis == 1 { layout.plane() } else { values.len() };
+            values.chunks_exact_mut(part).for_each(|part| fill_ghosts(part, layout, axis, rules));
         }
-        self.fill_ghost_planes(layout, component, field);
-    }
-
-    /// Fills the ghosts along x and y of one plane of a field.
-    pub(crate) fn fill_ghosts_of_plane<R: Real>(
-        &self,
-        layout: Layout,
-        component: Option<usize>,
-        plane: &mut [R],
-    ) {
-        for axis in [0, 1] {
-            fill_ghosts(plane, layout, axis, self.ghost_rules(axis, component));
-        }
-    }
-
-    /// Fills the ghost planes of a field, and the ghosts of the upper boundary faces.
-    pub(crate) fn fill_ghost_planes<R: Real>(
-        &self,
-        layout: Layout,
-        component: Option<usize>,
-        field: &mut [R],
-    ) {
-        if component == Some(2) && !self.is_periodic(2) {
-            let upper = (layout.cells[2] + 1) * layout.plane();
-            self.fill_ghosts_of_plane(layout, component, &mut field[upper..]);
-        }
-        fill_ghosts(field, layout, 2, self.ghost_rules(2, component));
     }
 
     /// Rules for the lower and upper ghosts along `axis` of a velocity `component`, or of the

@@ -127,13 +127,13 @@ impl<R: Real> Flow<R> {
     pub fn fill_ghosts(&mut self) {
         for axis in 0..3 {
             let component = self.velocity.component_mut(axis);
-            self.boundaries.fill_ghosts(self.mesh.layout(), Some(axis), component);
+            self.boundaries.fill_ghosts(self.mesh.layout(), Some(axis), 0..3, component);
         }
     }
 
     /// Fills the ghosts of the pressure.
     fn fill_pressure_ghosts(&mut self) {
-        self.boundaries.fill_ghosts(self.mesh.layout(), None, &mut self.pressure);
+        self.boundaries.fill_ghosts(self.mesh.layout(), None, 0..3, &mut self.pressure);
     }
 
     /// Sets the uniform acceleration that drives the flow [m/s^2].
@@ -221,18 +221,21 @@ impl<R: Real> Flow<R> {
             });
             let components = [Some(0), Some(1), Some(2), None];
             for (component, field) in components.into_iter().zip([x, y, z, p]) {
-                boundaries.fill_ghosts_of_plane(layout, component, field);
+                boundaries.fill_ghosts(layout, component, 0..2, field);
             }
         };
         let fields = [x, y, z, &mut self.pressure];
         self.poisson.solve(non_temporal, divergence, fields, &mut self.partial, correct);
         if !periodic[2] {
+            // The upper boundary faces keep the predicted velocity.
             let upper = (layout.cells[2] + 1) * layout.plane()..;
-            self.velocity.z[upper.clone()].copy_from_slice(&predicted.z[upper]);
+            let faces = &mut self.velocity.z[upper.clone()];
+            faces.copy_from_slice(&predicted.z[upper]);
+            boundaries.fill_ghosts(layout, Some(2), 0..2, faces);
         }
-        boundaries.fill_ghost_planes(layout, None, &mut self.pressure);
+        boundaries.fill_ghosts(layout, None, 2..3, &mut self.pressure);
         for axis in 0..3 {
-            boundaries.fill_ghost_planes(layout, Some(axis), self.velocity.component_mut(axis));
+            boundaries.fill_ghosts(layout, Some(axis), 2..3, self.velocity.component_mut(axis));
         }
         self.total()
     }

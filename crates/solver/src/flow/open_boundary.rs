@@ -183,9 +183,9 @@ impl BoundaryFaces {
         self.start + (a - 1) * self.steps[0] + (b - 1) * self.steps[1]
     }
     fn each(&self, mut f: impl FnMut(usize, usize)) {
-        for b in 0..self.counts[1] {
-            for a in 0..self.counts[0] {
-                let at = self.start + a * self.steps[0] + b * self.steps[1];
+        for b in 1..=self.counts[1] {
+            for a in 1..=self.counts[0] {
+                let at = self.at([a, b]);
                 f(at, at.wrapping_add_signed(self.inward));
             }
         }

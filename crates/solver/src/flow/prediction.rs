@@ -84,7 +84,6 @@ pub struct PredictPlane<'a, R> {
     pub pressure: &'a [R],
     /// Whether each axis is periodic; boundary faces normal to the others are not unknown.
     pub periodic: [bool; 3],
-    /// Index of the plane.
     pub k: usize,
     /// Whether the prediction is written with non-temporal stores.
     pub non_temporal: bool,

@@ -136,7 +136,6 @@ impl<R: Real> FaceRows<'_, R> {
 
 /// Divergence of one plane of the prediction over dt, the right-hand side of the Poisson equation.
 pub struct Divergence<'a, R> {
-    /// Prediction u*.
     pub faces: FacePlanes<'a, R>,
     /// Time step [s].
     pub dt: f64,
@@ -177,11 +176,9 @@ impl<R: Real> RowWork for DivergenceRow<'_, R> {
 
 /// Correction of one plane: u = u* - dt grad f, p += f; the caller fills the ghosts.
 pub struct Correct<'a, R> {
-    /// Prediction u*.
     pub faces: FacePlanes<'a, R>,
     /// Pressure increment over density f [m^2/s^2].
     pub solution: Solution<'a, R>,
-    /// Index of the plane.
     pub k: usize,
     /// Time step [s].
     pub dt: f64,

@@ -55,7 +55,7 @@ fn divergence_is_minus_the_transposed_gradient() {
     let mut state = 5;
     let mut p = Field::<Centre>::zeros(&mesh);
     p.iter_mut().for_each(|value| *value = noise(&mut state));
-    flow.boundaries.fill_ghosts(mesh.layout(), None, &mut p);
+    flow.boundaries.fill_ghosts(mesh.layout(), None, 0..3, &mut p);
     let mut u = flow.velocity.clone();
     for axis in 0..3 {
         u.component_mut(axis).iter_mut().for_each(|value| *value = noise(&mut state));
