@@ -149,16 +149,6 @@ enum GhostRule {
     Wall(f64),
 }
 
-/// Ghost value beyond a wall of velocity `wall` [m/s], on the parabola through the wall and the two
-/// nearest values, which makes the shear at the wall second-order.
-fn beyond_wall<R: Real>(wall: f64, near: R, next: R, n: usize) -> R {
-    R::of(if n == 1 {
-        2.0 * wall - near.wide()
-    } else {
-        (8.0 * wall - 6.0 * near.wide() + next.wide()) / 3.0
-    })
-}
-
 /// Fills the ghosts at the lower and upper end of an axis, of a plane (x, y) or of a field (z), by
 /// the rule of each end.
 fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [GhostRule; 2]) {
@@ -171,7 +161,13 @@ fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [G
             GhostRule::ZeroGradient => (near, None),
             GhostRule::Wall(velocity) => (near, Some(velocity)),
         };
-        let value = |near: R, next: R| wall.map_or(near, |wall| beyond_wall(wall, near, next, n));
+        let value = |near: R, next: R| match wall {
+            None => near,
+            Some(wall) if n == 1 => R::of(2.0 * wall - near.wide()),
+            // The parabola through the wall and the two nearest values makes the shear at the wall
+            // second-order.
+            Some(wall) => R::of((8.0 * wall - 6.0 * near.wide() + next.wide()) / 3.0),
+        };
         if axis == 0 {
             for row in values.chunks_exact_mut(layout.row()) {
                 row[ghost] = value(row[from], row[next]);

@@ -136,8 +136,9 @@ impl<R: Real> Flow<R> {
     pub fn pressure_below(&self, covered: &[CoveredFace]) -> Vec<f64> {
         let Some(first) = covered.first() else { return Vec::new() };
         let faces = BoundaryFaces::new(&self.mesh, first.side);
-        let inner = |at: usize| if first.side.side == 0 { at } else { at - faces.depth };
-        let pressure = |at: usize| self.pressure[inner(at)].wide();
+        // A face has the index of the cell above it.
+        let cell = faces.inward.min(0);
+        let pressure = |at: usize| self.pressure[at.wrapping_add_signed(cell)].wide();
         let (mut sum, mut open) = (0.0, faces.count as f64);
         faces.each(|at, _| sum += pressure(at));
         for face in covered {
@@ -152,8 +153,6 @@ impl<R: Real> Flow<R> {
 /// The faces of one side of the box and their inner neighbours in memory.
 struct BoundaryFaces {
     start: usize,
-    /// Distance in memory between two layers.
-    depth: usize,
     inward: isize,
     steps: [usize; 2],
     counts: [usize; 2],
@@ -170,7 +169,6 @@ impl BoundaryFaces {
         let strides = layout.strides();
         BoundaryFaces {
             start: layout.index(first[0], first[1], first[2]),
-            depth: strides[axis],
             inward: (1 - 2 * side.side as isize) * strides[axis] as isize,
             steps: [strides[a], strides[b]],
             counts: [mesh.cells[a], mesh.cells[b]],

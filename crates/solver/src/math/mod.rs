@@ -2,6 +2,7 @@
 
 mod cache;
 mod formula;
+#[cfg(all(target_os = "linux", not(miri)))]
 mod pool_clock;
 mod precedence;
 mod time_spent;

@@ -3,7 +3,14 @@
 use std::ops::{Add, AddAssign, Sub};
 use std::time::{Duration, Instant};
 
+#[cfg(all(target_os = "linux", not(miri)))]
 use super::pool_clock::pool_cpu_time;
+
+/// Miri and other systems have no clocks of threads.
+#[cfg(any(miri, not(target_os = "linux")))]
+fn pool_cpu_time() -> Option<Duration> {
+    None
+}
 
 /// Wall and CPU time spent in a pass.
 #[derive(Clone, Copy, Debug, Default)]

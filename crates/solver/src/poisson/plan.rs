@@ -210,13 +210,7 @@ pub fn factors(mut n: usize) -> Vec<usize> {
         found.push(1 << taken);
         twos -= taken;
     }
-    for radix in [3, 5, 7] {
-        while n.is_multiple_of(radix) {
-            found.push(radix);
-            n /= radix;
-        }
-    }
-    let mut radix = 11;
+    let mut radix = 3;
     while n > 1 {
         if radix * radix > n {
             radix = n;
