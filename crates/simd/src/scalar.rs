@@ -10,27 +10,20 @@ use super::{Real, Vector};
 #[repr(transparent)]
 pub struct Scalar<R>(pub R);
 
-impl<R: Real> Add for Scalar<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Scalar(self.0 + other.0)
-    }
+macro_rules! operator {
+    ($trait:ident, $method:ident, $symbol:tt) => {
+        impl<R: Real> $trait for Scalar<R> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Scalar(self.0 $symbol other.0)
+            }
+        }
+    };
 }
-impl<R: Real> Sub for Scalar<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Scalar(self.0 - other.0)
-    }
-}
-impl<R: Real> Mul for Scalar<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Scalar(self.0 * other.0)
-    }
-}
+operator!(Add, add, +);
+operator!(Sub, sub, -);
+operator!(Mul, mul, *);
 impl<R: Real> Sealed for Scalar<R> {}
 impl<R: Real> Vector for Scalar<R> {
     const WIDTH: usize = 1;

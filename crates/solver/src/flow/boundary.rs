@@ -96,8 +96,8 @@ impl Boundaries {
         }
     }
 
-    /// Fills the ghosts along `axes` of a velocity `component`, or of the pressure if none. `values`
-    /// are a field, or whole planes of it for the axes x and y.
+    /// Fills the ghosts along `axes` of a velocity `component`, or of the pressure if none.
+    /// `values` are a field, or whole planes of it for the axes x and y.
     pub(crate) fn fill_ghosts<R: Real>(
         &self,
         layout: Layout,

@@ -163,8 +163,7 @@ impl<R: Real> Flow<R> {
     pub fn predict(&mut self, dt: f64) {
         let ratio = self.previous_step.map_or(0.0, |previous| dt / previous);
         let (now, before) = (dt * (1.0 + 0.5 * ratio), -dt * 0.5 * ratio);
-        self.coefficients.now = now;
-        self.coefficients.before = before;
+        (self.coefficients.now, self.coefficients.before) = (now, before);
         self.coefficients.dt_per_h = self.mesh.spacing.to_array().map(|h| dt / h);
         let (layout, periodic) = (self.mesh.layout(), self.boundaries.periodic());
         let (velocity, pressure, boundaries) = (&self.velocity, &self.pressure, &self.boundaries);

@@ -141,8 +141,8 @@ fn planes<R>(layout: Layout, field: &[R], k: usize) -> [&[R]; 3] {
     [layout.plane_of(field, k - 1), layout.plane_of(field, k), layout.plane_of(field, k + 1)]
 }
 
-/// Rows j - 1, j, j + 1, each of the planes k - 1, k, k + 1. All have one length, so that one bounds
-/// check serves all of them.
+/// Rows j - 1, j, j + 1, each of the planes k - 1, k, k + 1. All have one length, so that one
+/// bounds check serves all of them.
 type Rows<'a, R> = [[&'a [R]; 3]; 3];
 
 #[inline(always)]

@@ -157,8 +157,8 @@ impl Nesting {
     }
 
     /// Sets the velocity of `to` in the cells of the refined box that `is_new` selects. On the
-    /// faces of the whole grid it is that of [`Self::set_quarters`]. Inside its cells it is the one by
-    /// Toth and Roe (2002): all eight refined cells of a cubic cell have its divergence.
+    /// faces of the whole grid it is that of [`Self::set_quarters`]. Inside its cells it is the one
+    /// by Toth and Roe (2002): all eight refined cells of a cubic cell have its divergence.
     pub fn prolong_velocity<R: Real>(
         &self,
         from: &FaceVector<R>,

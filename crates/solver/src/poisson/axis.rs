@@ -20,7 +20,6 @@ pub struct AxisTransform<R> {
     /// Eigenvalue of mode k [1/m^2], in the order in which modes are stored. On a periodic axis
     /// index k <= n/2 holds the cosine part of mode k, its mirror the sine part.
     pub eigenvalues: Vec<f64>,
-    /// Fourier transform of n points.
     pub fourier: Fourier<R>,
     /// cos and sin of pi k / 2n for cosine modes; 1 and 0 on a periodic axis.
     pub turn: Vec<[R; 2]>,

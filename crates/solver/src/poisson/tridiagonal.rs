@@ -44,7 +44,6 @@ pub struct Tridiagonal {
 
 /// Solves all columns of a block.
 pub struct Solve<'a, 'b, R> {
-    /// Systems along z.
     pub system: Tridiagonal,
     /// Right-hand sides, overwritten by the solutions.
     pub columns: &'a mut Columns<'b, R>,
@@ -52,7 +51,6 @@ pub struct Solve<'a, 'b, R> {
     pub lambda: &'a [f64],
     /// Whether the first column is the mean mode of a system defined up to a constant.
     pub singular: bool,
-    /// Scratch of the thread.
     pub scratch: &'a mut ColumnScratch,
 }
 
