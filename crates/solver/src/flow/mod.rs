@@ -136,6 +136,23 @@ impl<R: Real> Flow<R> {
         self.boundaries.fill_ghosts(self.mesh.layout(), None, 0..3, &mut self.pressure);
     }
 
+    /// Fills the ghosts of velocity and pressure after the cells of the planes `changed`, and the
+    /// faces around them, have got new values.
+    fn fill_ghosts_beside(&mut self, changed: &[usize]) {
+        let (layout, boundaries) = (self.mesh.layout(), &self.boundaries);
+        let fill = |component, values: &mut [R]| {
+            for plane in changed.iter().map(|k| k * layout.plane()) {
+                let with_upper_faces = &mut values[plane..plane + 2 * layout.plane()];
+                boundaries.fill_ghosts(layout, component, 0..2, with_upper_faces);
+            }
+            boundaries.fill_ghosts(layout, component, 2..3, values);
+        };
+        for axis in 0..3 {
+            fill(Some(axis), self.velocity.component_mut(axis));
+        }
+        fill(None, &mut self.pressure);
+    }
+
     /// Sets the uniform acceleration that drives the flow [m/s^2].
     pub fn set_body_acceleration(&mut self, acceleration: DVec3) {
         self.coefficients.acceleration = acceleration;
