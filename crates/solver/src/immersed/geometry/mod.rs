@@ -114,7 +114,7 @@ impl Locator {
         self.shapes.bytes()
     }
 
-    /// Finds the neighbours of all grains, before [`Locator::locate`]: grains whose spheres overlap.
+    /// Finds the neighbours of all grains, those whose spheres overlap, before [`Locator::locate`].
     /// A sphere contains all faces within reach of the surface of grain i, and `displacement(i)`
     /// [m] extends it to the last pose of the grain, whose faces count as well; 0 if they do not.
     pub fn find_neighbours(&mut self, grains: &[Grain], displacement: impl Fn(usize) -> f64) {
