@@ -332,10 +332,15 @@ fn a_billion_models_are_refused_at_once() {
 #[test]
 fn the_studies_of_the_morphology_expand() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/dkt-morphology");
-    // The ensemble has 65 models on three grids with 8 members each. The trailing grain has a gap
-    // instead of a position.
-    let expected =
-        [("study.toml", 65), ("quick.toml", 65), ("finest.toml", 4), ("ensemble.toml", 1560)];
+    // The ensemble has 65 models on three grids with 8 members each, `members.toml` on one. The
+    // trailing grain has a gap instead of a position.
+    let expected = [
+        ("study.toml", 65),
+        ("quick.toml", 65),
+        ("finest.toml", 4),
+        ("members.toml", 520),
+        ("ensemble.toml", 1560),
+    ];
     for (name, count) in expected {
         let runs = plan(&folder.join(name)).map(|plan| plan.runs.len());
         assert_eq!(runs.ok(), Some(count), "{name}");
