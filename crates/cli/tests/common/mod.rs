@@ -102,13 +102,18 @@ pub fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     found
 }
 
-/// Asserts that two run folders have equal bits, except for provenance, wall time and the report.
+/// Asserts that two run folders have equal bits, except for provenance, wall time, the report, and
+/// the unfinished file of a killed process, which is removed after a day.
 pub fn assert_same_run(a: &Path, b: &Path) {
-    let drawn = |name: &str| name == "report.html" || name.starts_with("figures/");
+    let ignored = |name: &str| {
+        ["provenance.json", "report.html"].contains(&name)
+            || name.starts_with("figures/")
+            || name.ends_with(".tmp")
+    };
     let strip = |files: Vec<(String, Vec<u8>)>| -> Vec<(String, Vec<u8>)> {
         files
             .into_iter()
-            .filter(|(name, _)| name != "provenance.json" && !drawn(name))
+            .filter(|(name, _)| !ignored(name))
             .map(|(name, bytes)| {
                 if name != "summary.json" {
                     return (name, bytes);
