@@ -40,7 +40,7 @@ pub fn along_row<V: Vector>(n: usize, work: &mut impl RowWork<Number = V::Number
 /// them; entry 0 of `row` is the ghost below entry 1.
 ///
 /// Non-temporal stores are for whole lines: a line that also gets an ordinary store is written to
-/// memory in part and read back, which makes a step up to five times as long.
+/// memory in part and read back, which makes a step up to three times as long.
 #[inline]
 pub fn inner_lines<V: Vector>(row: &[V::Number], n: usize) -> Range<usize> {
     let line = V::Number::LANES;

@@ -1,4 +1,4 @@
-//! Arguments of the command line; those of `grain` have a module.
+//! Arguments of the command line; those of `grain` have a module of their own.
 
 mod grain;
 

@@ -177,9 +177,9 @@ fn fill_ghosts<R: Real>(values: &mut [R], layout: Layout, axis: usize, rules: [G
         // A whole row or plane of ghosts.
         let layer = |index: usize| index * step..(index + 1) * step;
         values.copy_within(layer(from), ghost * step);
-        if wall.is_some()
-            && let Ok([ghosts, next]) = values.get_disjoint_mut([layer(ghost), layer(next)])
-        {
+        if wall.is_some() {
+            let layers = values.get_disjoint_mut([layer(ghost), layer(next)]);
+            let [ghosts, next] = layers.expect("a ghost layer is no interior layer");
             ghosts.iter_mut().zip(next).for_each(|(ghost, next)| *ghost = value(*ghost, *next));
         }
     }

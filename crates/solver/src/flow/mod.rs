@@ -136,14 +136,13 @@ impl<R: Real> Flow<R> {
         self.boundaries.fill_ghosts(self.mesh.layout(), None, 0..3, &mut self.pressure);
     }
 
-    /// Fills the ghosts of velocity and pressure after the cells of the planes `changed`, and the
-    /// faces around them, have got new values.
-    fn fill_ghosts_beside(&mut self, changed: &[usize]) {
+    /// Fills the ghosts of velocity and pressure after values changed in the planes `changed`.
+    fn fill_ghosts_after(&mut self, changed: &[usize]) {
         let (layout, boundaries) = (self.mesh.layout(), &self.boundaries);
         let fill = |component, values: &mut [R]| {
-            for plane in changed.iter().map(|k| k * layout.plane()) {
-                let with_upper_faces = &mut values[plane..plane + 2 * layout.plane()];
-                boundaries.fill_ghosts(layout, component, 0..2, with_upper_faces);
+            for k in changed {
+                let plane = &mut values[k * layout.plane()..(k + 1) * layout.plane()];
+                boundaries.fill_ghosts(layout, component, 0..2, plane);
             }
             boundaries.fill_ghosts(layout, component, 2..3, values);
         };

@@ -130,7 +130,7 @@ impl<R: Real> NestedFlow<R> {
             measures.kinetic_energy += energy;
         }
         nesting.average_cells(&mut flow.pressure, &mut whole.pressure);
-        whole.fill_ghosts_beside(nesting.inside(2));
+        whole.fill_ghosts_after(nesting.inside(2));
         nesting.fill_ghosts(&whole.velocity, &mut flow.velocity);
         measures.max_divergence = measures.max_divergence.max(refined.max_divergence);
         measures.max_rate = measures.max_rate.max(refined.max_rate);
