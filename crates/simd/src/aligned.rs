@@ -11,7 +11,6 @@ use super::Real;
 pub struct Aligned<R> {
     values: Vec<R>,
     start: usize,
-    len: usize,
 }
 
 impl<R: Real> Aligned<R> {
@@ -23,17 +22,18 @@ impl<R: Real> Aligned<R> {
     pub fn with_head(head: usize, len: usize) -> Aligned<R> {
         assert!(head <= R::LANES);
         let offset = R::LANES * page_offset(R::BYTES * len);
-        let values = vec![R::default(); len + 2 * R::LANES - 1 + offset];
+        let mut values = vec![R::default(); len + 2 * R::LANES - 1 + offset];
         #[cfg(target_os = "linux")]
         advise_large_pages(&values);
         // The buffer is never reallocated, so the start stays where it is.
         let line = values.as_ptr().align_offset(R::LANES * R::BYTES);
         let start = line + R::LANES - head + offset;
-        Aligned { values, start, len }
+        values.truncate(start + len);
+        Aligned { values, start }
     }
     /// Replaces a list shorter than `len` by `len` zeros.
     pub fn make_room(&mut self, len: usize) {
-        if self.len < len {
+        if self.len() < len {
             *self = Aligned::zeros(len);
         }
     }
@@ -58,13 +58,13 @@ impl<R> Deref for Aligned<R> {
     type Target = [R];
     #[inline]
     fn deref(&self) -> &[R] {
-        &self.values[self.start..self.start + self.len]
+        &self.values[self.start..]
     }
 }
 impl<R> DerefMut for Aligned<R> {
     #[inline]
     fn deref_mut(&mut self) -> &mut [R] {
-        &mut self.values[self.start..self.start + self.len]
+        &mut self.values[self.start..]
     }
 }
 

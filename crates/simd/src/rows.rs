@@ -57,13 +57,35 @@ pub fn inner_lines<V: Vector>(row: &[V::Number], n: usize) -> Range<usize> {
 /// Windows at one place of lists of one length share one bounds check.
 #[inline(always)]
 pub fn window<V: Vector>(list: &[V::Number], at: usize) -> &[V::Number] {
-    &list[at - 1..][..V::WIDTH + 2]
+    &list[at - 1..at + V::WIDTH + 1]
 }
 
 /// Mutable slice of the `V::WIDTH` entries from `at` on; checked like [`window`].
 #[inline(always)]
 pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Number] {
-    &mut list[at - 1..][..V::WIDTH + 2][1..][..V::WIDTH]
+    &mut list[at - 1..at + V::WIDTH + 1][1..][..V::WIDTH]
+}
+
+/// Stores entries `i` to `i + V::WIDTH` of three rows, with non-temporal stores if they lie in
+/// `lines`. The ends of a row, which boundary conditions read, stay in the cache.
+#[inline(always)]
+pub fn store_rows<V: Vector>(
+    lines: &Range<usize>,
+    i: usize,
+    values: [V; 3],
+    rows: &mut [&mut [V::Number]; 3],
+) {
+    let [x, y, z] = rows;
+    let [x, y, z] = [window_mut::<V>(x, i), window_mut::<V>(y, i), window_mut::<V>(z, i)];
+    if i.wrapping_sub(lines.start) < lines.end - lines.start {
+        values[0].store_non_temporal(x);
+        values[1].store_non_temporal(y);
+        values[2].store_non_temporal(z);
+    } else {
+        values[0].store(x);
+        values[1].store(y);
+        values[2].store(z);
+    }
 }
 
 /// Partial sum of a row in doubles, in an order that does not depend on the width.

@@ -56,6 +56,11 @@ vector! {
         }
     }
     #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: see the head of `x86/mod.rs`.
+        unsafe { Avx2F64x4(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)) }
+    }
+    #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.
         unsafe {
@@ -95,6 +100,11 @@ vector! {
     _mm256_sqrt_ps,
     select256_ps, _mm256_fmadd_ps, _mm256_set1_ps, _mm256_loadu_ps,
     _mm256_storeu_ps, _mm256_stream_ps;
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: see the head of `x86/mod.rs`.
+        unsafe { Avx2F32x8(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) }
+    }
     #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.

@@ -51,6 +51,11 @@ vector! {
         unsafe { _mm512_mask_storeu_pd(to.as_mut_ptr().wrapping_sub(skip), lanes, self.0) };
     }
     #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: see the head of `x86/mod.rs`.
+        unsafe { Avx512F64x8(_mm512_abs_pd(self.0)) }
+    }
+    #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.
         unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, limit.0)) }
@@ -88,6 +93,11 @@ vector! {
     _mm512_sqrt_ps,
     select512_ps, _mm512_fmadd_ps, _mm512_set1_ps, _mm512_loadu_ps,
     _mm512_storeu_ps, _mm512_stream_ps;
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: see the head of `x86/mod.rs`.
+        unsafe { Avx512F32x16(_mm512_abs_ps(self.0)) }
+    }
     #[inline(always)]
     fn mask_below(self, limit: Self) -> u32 {
         // SAFETY: see the head of `x86/mod.rs`.

@@ -18,7 +18,8 @@ use super::{Boundaries, Flow, FluidParams};
 use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
 use grainwake_simd::{
-    Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, window, window_mut,
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_rows, window,
+    window_mut,
 };
 
 /// Coefficients of the tendency H and of the prediction u* = u + now H + before H_old - dt grad p.
@@ -109,6 +110,8 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
         let mut predicted = self.predicted.map(|plane| &mut plane[..layout.plane()]);
         let mut sums = [Partial::default(); 3];
         for j in 1..=layout.cells[1] {
+            let prescribed = [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1];
+            let before = prescribed.contains(&true).then_some(sums);
             let predicted = layout.rows_of_mut(&mut predicted, j);
             let streamed = if self.non_temporal { inner_lines::<V>(predicted[0], n) } else { 0..0 };
             let mut work = PredictRow {
@@ -120,7 +123,6 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 tendency: layout.rows_of_mut(&mut tendency, j),
                 predicted,
                 sums: &mut sums,
-                prescribed: [false, !self.periodic[1] && j == 1, !self.periodic[2] && k == 1],
                 streamed,
             };
             along_row::<V>(n, &mut work);
@@ -129,9 +131,26 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
                 let prescribed = -work.tendency[0][1].wide();
                 work.sums[0].add(1, Scalar::<R>::constant(prescribed));
             }
+            undo_prescribed(&mut sums, before, prescribed);
         }
         V::fence();
         *self.sum = DVec3::from_array(sums.map(|sum| sum.sum()));
+    }
+}
+
+/// Restores the sums from `before` a row for the components whose faces on the whole row have a
+/// prescribed velocity: these are no unknowns.
+#[inline(always)]
+pub fn undo_prescribed(
+    sums: &mut [Partial; 3],
+    before: Option<[Partial; 3]>,
+    prescribed: [bool; 3],
+) {
+    let Some(before) = before else { return };
+    for axis in 0..3 {
+        if prescribed[axis] {
+            sums[axis] = before[axis];
+        }
     }
 }
 
@@ -160,8 +179,6 @@ struct PredictRow<'a, R> {
     tendency: [&'a mut [R]; 3],
     predicted: [&'a mut [R]; 3],
     sums: &'a mut [Partial; 3],
-    /// Components whose faces on the whole row have a prescribed velocity.
-    prescribed: [bool; 3],
     /// Entries of the row that are written with non-temporal stores.
     streamed: Range<usize>,
 }
@@ -210,24 +227,17 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
         let pc = here(p);
         let lower = [left(p), here(pm), here(pb)];
         let (now, before) = (V::constant(c.now), V::constant(c.before));
-        // Boundary conditions read the ends of a row, which therefore stay in the cache.
-        let streamed = self.streamed.contains(&i);
+        let mut predicted = [V::constant(0.0); 3];
         for (axis, (h, q)) in [(hx, uc), (hy, vc), (hz, wc)].into_iter().enumerate() {
             let old = window_mut::<V>(self.tendency[axis], i);
             let pressure = V::constant(c.dt_per_h[axis]) * (pc - lower[axis]);
             // Small terms are summed before q is added: fewer of their digits are lost.
             let gain = now * h + before * V::load(old) - pressure;
-            let to = window_mut::<V>(self.predicted[axis], i);
-            if streamed {
-                (q + gain).store_non_temporal(to);
-            } else {
-                (q + gain).store(to);
-            }
+            predicted[axis] = q + gain;
             h.store(old);
-            if !self.prescribed[axis] {
-                self.sums[axis].add(i, h);
-            }
+            self.sums[axis].add(i, h);
         }
+        store_rows(&self.streamed, i, predicted, &mut self.predicted);
     }
 }
 

@@ -8,11 +8,13 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::prediction::undo_prescribed;
 use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{
-    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inner_lines, window, window_mut,
+    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_rows, window,
+    window_mut,
 };
 
 /// Measures of the flow over the whole grid after a projection.
@@ -204,6 +206,8 @@ impl<R: Real> Kernel for Correct<'_, R> {
         let mut partial = CorrectPartial::<R>::default();
         let mut rise = [0.0; 2];
         for j in 1..=ny {
+            let prescribed = [false, !periodic[1] && j == 1, !periodic[2] && self.k == 1];
+            let before = prescribed.contains(&true).then_some(partial.momentum);
             let out = layout.rows_of_mut(&mut velocity, j);
             let streamed = if self.non_temporal { inner_lines::<V>(out[0], n) } else { 0..0 };
             let mut work = CorrectRow {
@@ -216,7 +220,6 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 pressure: layout.row_of_mut(p, j),
                 streamed,
                 partial: &mut partial,
-                prescribed: [false, !periodic[1] && j == 1, !periodic[2] && self.k == 1],
             };
             self.faces.along_row::<V>(&mut work);
             if !periodic[0] {
@@ -226,6 +229,7 @@ impl<R: Real> Kernel for Correct<'_, R> {
                 // The upper boundary face keeps the predicted velocity.
                 work.out[0][n + 1] = work.faces.lower[0][n + 1];
             }
+            undo_prescribed(&mut work.partial.momentum, before, prescribed);
             rise[0] += work.pressure[n].wide() - work.pressure[1].wide();
         }
         if !periodic[1] {
@@ -274,8 +278,6 @@ struct CorrectRow<'a, R> {
     /// Entries of the row that are written with non-temporal stores.
     streamed: Range<usize>,
     partial: &'a mut CorrectPartial<R>,
-    /// Components whose faces on the whole row have a prescribed velocity.
-    prescribed: [bool; 3],
 }
 
 impl<R: Real> RowWork for CorrectRow<'_, R> {
@@ -291,26 +293,19 @@ impl<R: Real> RowWork for CorrectRow<'_, R> {
         let [predicted, above] = self.faces.load::<V>(i);
         let zero = V::constant(0.0);
         let (mut square, mut rate, mut divergence) = (zero, zero, zero);
-        // The ghosts are filled from the ends of a row, which therefore stay in the cache.
-        let streamed = self.streamed.contains(&i);
+        let mut corrected = [zero; 3];
         for axis in 0..3 {
             let (dt_per_h, inverse) =
                 (V::constant(self.dt_per_h[axis]), V::constant(self.faces.inverse[axis]));
             let q = predicted[axis] - dt_per_h * (f - lower[axis]);
             let next = above[axis] - dt_per_h * (upper[axis] - f);
-            let to = window_mut::<V>(self.out[axis], i);
-            if streamed {
-                q.store_non_temporal(to);
-            } else {
-                q.store(to);
-            }
+            corrected[axis] = q;
             square = square + q * q;
             rate = rate + q.abs() * inverse;
             divergence = divergence + (next - q) * inverse;
-            if !self.prescribed[axis] {
-                self.partial.momentum[axis].add(i, q);
-            }
+            self.partial.momentum[axis].add(i, q);
         }
+        store_rows(&self.streamed, i, corrected, &mut self.out);
         let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;
