@@ -394,3 +394,33 @@ fn use_trees_are_read_whole() {
     assert_eq!(names["Y"].join("::"), "m::n::x::Y");
     assert_eq!(names["V"].join("::"), "m::n::x::z::W");
 }
+
+/// Number of lines of a source file without its unit tests.
+fn product_lines(path: &Path) -> usize {
+    let text = fs::read_to_string(path).expect("a readable source");
+    let lines: Vec<&str> = text.lines().collect();
+    let (mut count, mut in_tests) = (0, false);
+    for (n, line) in lines.iter().enumerate() {
+        let next = lines.get(n + 1).unwrap_or(&"");
+        in_tests |= *line == "#[cfg(test)]" && next.contains("mod ") && next.ends_with('{');
+        count += usize::from(!in_tests);
+        in_tests &= *line != "}";
+    }
+    count
+}
+
+#[test]
+fn a_step_is_read_in_few_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let table = fs::read_to_string(root.join("../../results/step-files/files.csv"));
+    let table = table.expect("a list of the files of a step");
+    let of = |part: &str| -> Vec<usize> {
+        let files = table.lines().filter_map(|row| row.strip_suffix(part)?.split(',').next());
+        files.map(|file| product_lines(&root.join("src").join(file))).collect()
+    };
+    assert!((5..=9).contains(&of(",control flow").len()));
+    let below = of(",below it");
+    let lines: usize = below.iter().sum();
+    println!("{} files, {lines} lines", below.len());
+    assert!((20..=40).contains(&below.len()) && (4000..=8000).contains(&lines));
+}

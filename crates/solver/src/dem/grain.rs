@@ -1,12 +1,11 @@
-//! Grain: a shared shape, density, material, pose and velocities; its set-up, energy and momentum.
+//! Grain: a shared shape, density, material, pose and velocities.
 
 use std::sync::Arc;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
-use super::material::Material;
 use crate::math::{Pose, RigidVelocity};
 
 /// Whether the three components of a velocity follow the equations of motion or are prescribed.
@@ -27,6 +26,17 @@ impl MotionConstraint {
             MotionConstraint::Prescribed(velocity) => velocity,
         }
     }
+}
+
+/// Elastic constants and restitution of one body; the linear contact law does not use them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Young's modulus E [Pa]; infinite for a rigid body.
+    pub youngs_modulus: f64,
+    /// Poisson ratio nu.
+    pub poisson_ratio: f64,
+    /// Coefficient of restitution; a pair takes the smaller of its two values.
+    pub restitution: f64,
 }
 
 /// One grain. Velocities are at integer time levels, in the space frame.
@@ -51,51 +61,8 @@ pub struct Grain {
 }
 
 impl Grain {
-    /// Free grain of `density` [kg/m^3] at rest at the origin.
-    pub fn new(shape: impl Into<Arc<Shape>>, density: f64) -> Grain {
-        Grain {
-            shape: shape.into(),
-            density,
-            material: Material::default(),
-            pose: Pose { position: DVec3::ZERO, orientation: DQuat::IDENTITY },
-            velocity: DVec3::ZERO,
-            angular_velocity: DVec3::ZERO,
-            translation: MotionConstraint::Free,
-            rotation: MotionConstraint::Free,
-        }
-    }
-    /// Replaces the position of the centroid [m].
-    pub fn with_position(mut self, position: DVec3) -> Grain {
-        self.pose.position = position;
-        self
-    }
-    /// Replaces the orientation (body frame to space frame).
-    pub fn with_orientation(mut self, orientation: DQuat) -> Grain {
-        self.pose.orientation = orientation;
-        self
-    }
-    /// Replaces the material.
-    pub fn with_material(mut self, material: Material) -> Grain {
-        self.material = material;
-        self
-    }
-    /// Replaces the initial velocity of the centroid [m/s].
-    pub fn with_velocity(mut self, velocity: DVec3) -> Grain {
-        self.velocity = velocity;
-        self
-    }
-    /// Replaces the initial angular velocity, space frame [rad/s].
-    pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
-        self.angular_velocity = angular_velocity;
-        self
-    }
-    /// Holds the grain still.
-    pub fn held(mut self) -> Grain {
-        self.hold();
-        self
-    }
     /// Sets both velocities to zero and prescribes them.
-    fn hold(&mut self) {
+    pub(super) fn hold(&mut self) {
         (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
         let held = MotionConstraint::Prescribed(DVec3::ZERO);
         (self.translation, self.rotation) = (held, held);
@@ -137,22 +104,6 @@ impl Grain {
     /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.rigid_velocity().at(x - self.pose.position)
-    }
-    /// Kinetic energy of translation and rotation [J].
-    pub fn kinetic_energy(&self) -> f64 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        0.5 * self.mass() * self.velocity.length_squared()
-            + 0.5 * omega.dot(self.principal_inertia() * omega)
-    }
-    /// Linear momentum [kg m/s].
-    pub fn momentum(&self) -> DVec3 {
-        self.mass() * self.velocity
-    }
-    /// Angular momentum about the point `about` [kg m^2/s, space frame].
-    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        (self.pose.position - about).cross(self.momentum())
-            + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }
 

@@ -5,7 +5,7 @@
 //! 1. `motion`: sub-steps, integrator, rotation, response of the fluid, checkpoint of the contacts;
 //! 2. `contact`: force laws, friction history, lubrication;
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
-//! 4. `grain`, `material`, `enclosure`: the bodies and the box.
+//! 4. `grain`, `enclosure`: the bodies and the box.
 //!
 //! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
 //! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the
@@ -14,15 +14,14 @@
 mod contact;
 mod enclosure;
 mod grain;
-mod material;
+mod grain_setup;
 mod motion;
 mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner, Side};
 pub(crate) use grain::GrainKinematics;
-pub use grain::{Grain, MotionConstraint};
-pub use material::Material;
+pub use grain::{Grain, Material, MotionConstraint};
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };

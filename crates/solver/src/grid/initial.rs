@@ -28,34 +28,6 @@ impl Layout {
         let entries = self.cells[0] + 2;
         values.chunks_exact_mut(self.row()).map(move |row| &mut row[..entries])
     }
-    /// Copies both outermost interior layers of a periodic axis onto the ghosts across the box.
-    pub fn wrap<T: Copy>(&self, values: &mut [T], axis: usize) {
-        let n = self.cells[axis];
-        self.map_layer(values, axis, n, 0, |value| value);
-        self.map_layer(values, axis, 1, n + 1, |value| value);
-    }
-    /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
-    /// `values` are a field, or a plane for the axes x and y.
-    pub fn map_layer<T: Copy>(
-        &self,
-        values: &mut [T],
-        axis: usize,
-        from: usize,
-        to: usize,
-        f: impl Fn(T) -> T,
-    ) {
-        let [_, row, plane] = self.strides();
-        let shift = (from as isize - to as isize) * self.strides()[axis] as isize;
-        let len = values.len();
-        let mut set = |at: usize| values[at] = f(values[at.wrapping_add_signed(shift)]);
-        match axis {
-            0 => (0..len / row).for_each(|line| set(line * row + to)),
-            1 => {
-                (0..len / plane).for_each(|k| (0..row).for_each(|i| set(k * plane + to * row + i)))
-            }
-            _ => (0..plane).for_each(|at| set(to * plane + at)),
-        }
-    }
 }
 
 impl<L: Location, R: Real> Field<L, R> {

@@ -160,6 +160,34 @@ impl Layout {
     ) -> [&'a mut [T]; 3] {
         [self.row_of_mut(x, j), self.row_of_mut(y, j), self.row_of_mut(z, j)]
     }
+    /// Copies both outermost interior layers of a periodic axis onto the ghosts across the box.
+    pub fn wrap<T: Copy>(&self, values: &mut [T], axis: usize) {
+        let n = self.cells[axis];
+        self.map_layer(values, axis, n, 0, |value| value);
+        self.map_layer(values, axis, 1, n + 1, |value| value);
+    }
+    /// Sets layer `to` to `f` of layer `from`, both of `axis`, ghosts of the other axes included.
+    /// `values` are a field, or a plane for the axes x and y.
+    pub fn map_layer<T: Copy>(
+        &self,
+        values: &mut [T],
+        axis: usize,
+        from: usize,
+        to: usize,
+        f: impl Fn(T) -> T,
+    ) {
+        let [_, row, plane] = self.strides();
+        let shift = (from as isize - to as isize) * self.strides()[axis] as isize;
+        let len = values.len();
+        let mut set = |at: usize| values[at] = f(values[at.wrapping_add_signed(shift)]);
+        match axis {
+            0 => (0..len / row).for_each(|line| set(line * row + to)),
+            1 => {
+                (0..len / plane).for_each(|k| (0..row).for_each(|i| set(k * plane + to * row + i)))
+            }
+            _ => (0..plane).for_each(|at| set(to * plane + at)),
+        }
+    }
     /// Distance in memory between neighbours along each axis.
     #[inline]
     pub fn strides(&self) -> [usize; 3] {

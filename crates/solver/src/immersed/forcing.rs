@@ -142,16 +142,6 @@ impl ForcedFaces {
             &self.total_closed_fraction
         }
     }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let fractions = [&self.closed_fraction, &self.total_closed_fraction, &self.solid_fraction];
-        let runs: usize = self.runs.iter().map(Vec::capacity).sum();
-        let values: usize = fractions.into_iter().chain([&self.weight]).map(Vec::capacity).sum();
-        size_of::<FaceRun>() * runs
-            + size_of::<f32>() * values
-            + size_of::<f64>() * self.rest_gain.capacity()
-    }
 }
 
 /// Weights of the faces as if the grain had no neighbours, aperture scheme.

@@ -23,12 +23,14 @@
 //! `emerged.rs` treat grains that leave the box or float in a free surface, `initial.rs` sets the
 //! flow at t = 0. Every kernel has a plain scalar form in `reference/`, against which it is tested.
 
+mod access_log;
 mod advection;
 mod emerged;
 mod forcing;
 mod geometry;
 mod initial;
 mod links;
+mod memory;
 mod open_sides;
 #[cfg(test)]
 mod reference;
@@ -54,11 +56,10 @@ use serde::{Deserialize, Serialize};
 use crate::dem::Grain;
 use crate::flow::Flow;
 use crate::math::Real;
-use forcing::{ForcedFaces, ForcingParams};
+use access_log::AccessLog;
+use forcing::ForcedFaces;
 use geometry::Locator;
-use update::{
-    AccessLog, GrainUpdate, ImmersedGrain, ScratchPool, ThreadScratch, locate_and_compute_weights,
-};
+use update::{GrainUpdate, ImmersedGrain, ScratchPool, ThreadScratch, locate_and_compute_weights};
 
 /// Scheme by which the coupling imposes rigidity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,16 +139,5 @@ impl<R: Real> ImmersedGrains<R> {
         for grain in &mut self.grains {
             grain.forced = ForcedFaces::default();
         }
-    }
-
-    /// Parameters of the forcing in a step of `dt` [s].
-    fn forcing_params(&self, dt: f64) -> ForcingParams {
-        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
-        ForcingParams::new(self.scheme, eps, self.spacing, nu, dt)
-    }
-
-    /// Memory held without the buffers of threads [bytes].
-    pub fn bytes(&self) -> usize {
-        self.grains.iter().map(ImmersedGrain::bytes).sum::<usize>() + self.locator.bytes()
     }
 }

@@ -15,6 +15,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::advection::{add_correction, find_correction};
+use super::forcing::ForcingParams;
 use super::rigid_body::PreviousStep;
 use super::rigidity::add_rigid_gain;
 use super::update::{
@@ -78,6 +79,12 @@ pub struct RigidityInput<'a> {
 }
 
 impl<R: Real> ImmersedGrains<R> {
+    /// Parameters of the forcing in a step of `dt` [s].
+    pub(super) fn forcing_params(&self, dt: f64) -> ForcingParams {
+        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
+        ForcingParams::new(self.scheme, eps, self.spacing, nu, dt)
+    }
+
     /// Corrects the advection next to the last poses of the grains, locates the grains at their
     /// present poses, and assembles their equations of motion. Imposes rigidity on isolated grains.
     pub fn couple(&mut self, flow: &mut Flow<R>, input: CouplingInput) -> CoupledGrains {

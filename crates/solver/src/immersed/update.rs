@@ -1,6 +1,5 @@
 //! Work on one grain in a step: the whole update of an isolated grain; location and equations of
-//! motion of any other. Buffers of the threads, and in debug builds a log of the faces that they
-//! use.
+//! motion of any other. Buffers of the threads.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -14,7 +13,6 @@ use super::rigidity::{add_rigid_gain, sum_impulse};
 use super::shared_faces::share_faces;
 use crate::dem::{Grain, GrainKinematics};
 use crate::flow::{OldState, Prediction};
-use crate::grid::BorrowedRow;
 use crate::math::{Load, Pose, Real, RigidVelocity};
 
 /// Lists of the faces near one grain, kept from one step to the next.
@@ -30,17 +28,6 @@ pub struct ImmersedGrain {
     pub located_for: Option<(Pose, f64)>,
     /// Neighbours for which the lists were made.
     located_beside: Vec<NeighbourGrain>,
-}
-
-impl ImmersedGrain {
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let correction: usize = self.correction.iter().map(Vec::capacity).sum();
-        size_of::<ImmersedGrain>()
-            + self.body.bytes()
-            + self.forced.bytes()
-            + size_of::<f64>() * correction
-    }
 }
 
 /// Progress of one grain in a step.
@@ -257,74 +244,5 @@ impl<T: Default> ScratchPool<T> {
         let thread = rayon::current_thread_index().unwrap_or(0);
         // A buffer holds nothing from one grain to the next that a panic could damage.
         self.0[thread % self.0.len()].lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Rows of the prediction that the grains have borrowed in a step, to assert that no thread writes
-/// a face that another one uses; empty in release builds.
-#[derive(Default)]
-pub struct AccessLog(Mutex<Vec<(usize, BorrowedRow)>>);
-
-impl AccessLog {
-    /// Records the rows that a grain has borrowed.
-    pub fn record(&self, grain: usize, rows: Vec<BorrowedRow>) {
-        if !rows.is_empty() {
-            let entries = rows.into_iter().map(|row| (grain, row));
-            self.0.lock().expect("no thread panicked").extend(entries);
-        }
-    }
-
-    /// Panics if one grain writes a face that another one uses; clears the log.
-    pub fn assert_no_conflict(&mut self) {
-        let entries = self.0.get_mut().expect("no thread panicked");
-        entries.sort_unstable_by_key(|(grain, row)| (row.addresses.start, *grain));
-        // Earlier rows that contain the start of the present one.
-        let mut open: Vec<(usize, BorrowedRow)> = Vec::new();
-        for (grain, row) in entries.drain(..) {
-            open.retain(|(_, earlier)| earlier.addresses.end > row.addresses.start);
-            let conflict = open
-                .iter()
-                .find(|(other, earlier)| *other != grain && (earlier.mutable || row.mutable));
-            if let Some((other, _)) = conflict {
-                panic!("grains {other} and {grain} use the same faces at once");
-            }
-            open.push((grain, row));
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::ops::Range;
-
-    use super::*;
-
-    /// Log of entries: grain, faces, whether they are written.
-    fn log(entries: &[(usize, Range<usize>, bool)]) -> AccessLog {
-        let log = AccessLog::default();
-        for (grain, addresses, mutable) in entries {
-            let row = BorrowedRow { addresses: addresses.clone(), mutable: *mutable };
-            log.record(*grain, vec![row]);
-        }
-        log
-    }
-
-    #[test]
-    fn faces_read_by_several_grains_are_accepted() {
-        let (write, read) = (true, false);
-        log(&[(0, 10..20, write), (0, 12..18, write), (1, 20..30, read), (2, 25..40, read)])
-            .assert_no_conflict();
-    }
-
-    #[test]
-    #[should_panic(expected = "use the same faces")]
-    fn a_face_written_by_one_grain_and_read_by_another_is_refused() {
-        log(&[(0, 10..20, true), (1, 0..50, false), (2, 48..60, false)]).assert_no_conflict();
-    }
-
-    #[test]
-    #[should_panic(expected = "grains 2 and 1 use the same faces")]
-    fn a_reader_is_found_behind_a_longer_row_of_the_writer() {
-        log(&[(2, 1..10, false), (1, 2..20, false), (1, 5..6, true)]).assert_no_conflict();
     }
 }

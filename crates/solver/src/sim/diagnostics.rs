@@ -35,10 +35,6 @@ impl Simulation {
     pub fn max_divergence(&self) -> f64 {
         self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures().max_divergence)
     }
-    /// CFL number of the last step; zero without fluid.
-    pub fn cfl(&self) -> f64 {
-        self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures().max_rate * self.clock.last_step)
-    }
     /// Measures the state at the end of the last step.
     pub fn diagnostics(&self) -> Diagnostics {
         let grains = &self.setup.grains;

@@ -4,6 +4,7 @@ mod clock;
 mod control;
 mod diagnostics;
 pub mod events;
+mod failure;
 mod fields;
 mod fluid;
 mod prescription;
@@ -36,11 +37,11 @@ use timing::PassTimes;
 
 pub use control::{ControlError, MotionComponent};
 pub use diagnostics::Diagnostics;
+pub use failure::{Remedy, RemedyTerms, StepError};
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
 pub use sample::{PlaneSample, PointSample};
 pub use setup::{Setup, SetupError, StepRule};
-pub use stability::{Remedy, RemedyTerms, StepError};
 pub use step::SAME_TIME;
 
 /// Simulation of grains in a fluid, or of grains alone.

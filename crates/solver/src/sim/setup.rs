@@ -255,3 +255,29 @@ impl Setup {
         Ok(())
     }
 }
+
+impl Prescription {
+    /// Largest sum of the absolute components of the initial velocity [m/s], sampled at about
+    /// thirty points along each axis of `mesh`; NaN if a formula is undefined at one of them.
+    pub fn initial_speed(&self, mesh: &Mesh) -> Option<f64> {
+        let formula = self.initial_velocity.as_ref()?;
+        let points = |axis: usize| {
+            let count = mesh.cells[axis].min(30);
+            (0..=count).map(move |i| i as f64 / count as f64)
+        };
+        let mut largest: f64 = 0.0;
+        for z in points(2) {
+            for y in points(1) {
+                for x in points(0) {
+                    let at = mesh.origin + mesh.extent() * DVec3::new(x, y, z);
+                    let speed = formula.at(&at.to_array()).abs().element_sum();
+                    if !speed.is_finite() {
+                        return Some(f64::NAN);
+                    }
+                    largest = largest.max(speed);
+                }
+            }
+        }
+        Some(largest)
+    }
+}

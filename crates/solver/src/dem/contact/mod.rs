@@ -1,13 +1,15 @@
-//! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` has the
-//! force laws, `model.rs` the loads of a pair. At set-up, `parameters.rs` selects the law.
+//! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` and
+//! `hertz_mindlin.rs` have the force laws, `model.rs` the loads of a pair. At set-up,
+//! `parameters.rs` selects the law.
 //!
-//! A further force law implements `ContactLaw` in `law.rs` or in a file beside it, and needs one
+//! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`, and needs one
 //! variant of [`ContactLawKind`], one arm of `ContactParams::force_law`, and its keys in the case
 //! file. A cohesive law overrides `ContactLaw::normal_force`, which is never negative by default. A
 //! force across a gap belongs beside the lubrication in `model.rs`: `ContactModel::range` makes
 //! pairs of this gap contacts, and `substeps.rs` chooses the sub-steps and takes the mean over the
 //! nodes in contact.
 
+mod hertz_mindlin;
 mod law;
 mod model;
 mod parameters;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::law::{BodyProperties, ContactLaw, HertzMindlin, Linear, PairProperties};
-use crate::dem::grain::Grain;
-use crate::dem::material::Material;
+use super::hertz_mindlin::HertzMindlin;
+use super::law::{BodyProperties, ContactLaw, Linear, PairProperties};
+use crate::dem::grain::{Grain, Material};
 
 /// Force laws of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

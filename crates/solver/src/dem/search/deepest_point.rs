@@ -4,7 +4,7 @@
 use glam::{DMat2, DVec2, DVec3};
 use grainwake_shape::Shape;
 
-use super::patch_tree::PosedShape;
+use super::patches::PosedShape;
 use super::surface::{PartnerField, SurfacePoint, is_sphere, project_to_surface};
 
 /// First and last radius of the compass search [node spacings].

@@ -8,6 +8,7 @@
 mod deepest_point;
 mod gap;
 mod narrow_phase;
+mod patch_layout;
 mod patch_scan;
 mod patch_tree;
 mod patches;
@@ -15,7 +16,7 @@ mod surface;
 
 pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ContactPatch, ContactPoint};
-pub(super) use patch_tree::{PatchTree, PosedShape};
+pub(super) use patches::{PatchTree, PosedShape};
 pub(crate) use surface::is_sphere;
 
 use glam::{DVec3, IVec3};

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::deepest_point::deepest_point_of_sphere;
 use super::patch_scan::{PenetratingPoint, SurfaceMemory, scan_candidates, scan_patches};
-use super::patch_tree::PosedShape;
+use super::patches::PosedShape;
 use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint, is_sphere};
 
 /// Penetrating point of a pair, or the closest point of a pair without contact, space frame.

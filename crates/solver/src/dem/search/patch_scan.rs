@@ -1,7 +1,7 @@
 //! Patches of one grain that penetrate its partner, and the nearest patch: by the hierarchy of the
 //! patches, or within a step by the candidates of the last search.
 
-use super::patch_tree::PatchTree;
+use super::patches::PatchTree;
 use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint};
 
 /// Distance from the partner up to which patches are candidates of the next searches [node

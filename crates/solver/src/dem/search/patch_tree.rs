@@ -1,45 +1,12 @@
-//! Hierarchy of the surface patches of a shape, built once for each shape.
+//! Set-up of the hierarchy of the surface patches of a shape.
 
-use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 
-use super::patches::{SurfacePatch, surface_patches};
+use super::patch_layout::surface_patches;
+use super::patches::{PatchCluster, PatchTree};
 
 /// Most patches of a leaf.
 const LEAF: usize = 8;
-
-/// Bounding sphere of the positions of a range of patches.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::dem) struct PatchCluster {
-    /// Centre, principal frame [m].
-    pub centre: DVec3,
-    /// Radius [m].
-    pub radius: f64,
-    /// Range of patches: first, and one past the last.
-    pub patches: (u32, u32),
-    /// Index of the next cluster in depth-first order outside this subtree.
-    pub skip: u32,
-}
-
-impl PatchCluster {
-    /// Returns true if this cluster, at `index`, has no sub-clusters.
-    pub fn is_leaf(&self, index: usize) -> bool {
-        self.skip as usize == index + 1
-    }
-}
-
-/// Patches and clusters of one shape.
-#[derive(Clone, Debug)]
-pub(in crate::dem) struct PatchTree {
-    /// Patches at the nodes and at further points of the surface, in the order of the leaves.
-    pub patches: Vec<SurfacePatch>,
-    /// Clusters in depth-first order.
-    pub clusters: Vec<PatchCluster>,
-    /// Spacing of the shape's nodes: square root of their mean area [m].
-    pub spacing: f64,
-    /// Largest extent of a patch [m].
-    pub extent: f64,
-}
 
 impl PatchTree {
     /// Builds the hierarchy of a shape by halving along the longest extent.
@@ -81,19 +48,6 @@ impl PatchTree {
         }
         self.clusters[index].skip = self.clusters.len() as u32;
     }
-}
-
-/// Shape of a grain, or of a periodic image, at its pose.
-#[derive(Clone, Copy)]
-pub(in crate::dem) struct PosedShape<'a> {
-    /// Shape.
-    pub shape: &'a Shape,
-    /// Hierarchy of its surface patches.
-    pub tree: &'a PatchTree,
-    /// Rotation from the principal frame to the space frame.
-    pub rotation: DMat3,
-    /// Centroid [m].
-    pub position: DVec3,
 }
 
 #[cfg(test)]

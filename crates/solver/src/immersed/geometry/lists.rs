@@ -84,16 +84,6 @@ impl LocatedBody {
     pub fn overlaps(&self, part: &Range<usize>, layout: Layout) -> bool {
         self.planes.start < part.end && part.start < self.planes.end + layout.plane()
     }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let lists = (0..3).map(|component| {
-            size_of::<f32>() * self.distance[component].capacity()
-                + size_of::<RowSpan>() * self.spans[component].capacity()
-                + size_of::<FaceRow>() * self.rows[component].capacity()
-        });
-        lists.sum::<usize>() + self.index_map.bytes()
-    }
 }
 
 /// Distances and normals of the faces in the forcing band of one grain, in the order of the
@@ -190,9 +180,9 @@ const NONE: usize = 1 << 60;
 pub struct IndexMap {
     /// Offsets of unknowns by axis, `[0]` for cells and faces parallel to the axis, `[1]` for faces
     /// normal to it; `NONE` elsewhere. Entry 0 is the offset of cell `-PAD` of the box.
-    unknown_offsets: [[Vec<usize>; 2]; 3],
+    pub(in crate::immersed) unknown_offsets: [[Vec<usize>; 2]; 3],
     /// Offsets of all entries of a field by axis, ghost cells beyond walls included.
-    offsets: [Vec<usize>; 3],
+    pub(in crate::immersed) offsets: [Vec<usize>; 3],
 }
 
 /// Unknown faces of one row that are adjacent in memory.
@@ -302,12 +292,6 @@ impl IndexMap {
                 }
             }
         }
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        let tables = self.unknown_offsets.iter().flatten().chain(&self.offsets);
-        tables.map(|table| size_of::<usize>() * table.capacity()).sum()
     }
 }
 

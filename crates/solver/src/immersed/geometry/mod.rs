@@ -14,36 +14,13 @@ mod sampling;
 pub use distances::LocateScratch;
 pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
 pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
-
-use glam::{DMat3, DVec3};
-use grainwake_shape::Shape;
+pub use sampling::narrow_band_bytes;
 
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
-use crate::flow::Boundaries;
 use crate::grid::Mesh;
-use aperture::forcing_reach;
 use distances::FillLists;
+use glam::{DMat3, DVec3};
 use grainwake_simd::dispatch;
-use samples::BandSamples;
-
-/// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
-/// depends more on where the grid lies; a wider one smooths thin boundary layers
-/// (`docs/decisions/0018-pressure-weight.md`).
-const BAND_HALF_WIDTH: f64 = 1.25;
-
-/// Half-width of the band around a surface, and distance up to which a grain affects faces [m].
-fn half_width_and_reach(mesh: &Mesh) -> [f64; 2] {
-    let spacings: Vec<f64> = mesh.resolved_axes().map(|axis| mesh.spacing[axis]).collect();
-    let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
-    // Half a link along the axis of the largest spacing beyond the reach of the forcing.
-    [eps, forcing_reach(eps) + 0.5 * spacings.into_iter().fold(0.0, f64::max)]
-}
-
-/// Expected memory of the distances sampled around the surface of a shape on a grid [bytes].
-/// Grains of one shape share them.
-pub fn narrow_band_bytes(mesh: &Mesh, shape: &Shape) -> f64 {
-    BandSamples::expected_bytes(shape, half_width_and_reach(mesh))
-}
 
 /// Fraction of the size of two grains below which their distances from a face count as equal, since
 /// distances are in single precision. Exactly one of two grains, or of two periodic images, at
@@ -71,29 +48,6 @@ pub struct Locator {
 }
 
 impl Locator {
-    /// Samples the shapes of `grains` for a grid.
-    pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
-        let [eps, reach] = half_width_and_reach(mesh);
-        Locator {
-            mesh: *mesh,
-            periodic: boundaries.periodic(),
-            eps,
-            reach,
-            shapes: NarrowBandShapes::new(grains, [eps, reach], mesh.resolved_axes().count()),
-            search: BroadPhase::default(),
-            spheres: Vec::new(),
-            pairs: Vec::new(),
-            neighbours: Vec::new(),
-            first_neighbour: Vec::new(),
-        }
-    }
-
-    /// Replaces the grid by one of the same spacing.
-    pub fn set_grid(&mut self, mesh: &Mesh, boundaries: &Boundaries) {
-        self.mesh = *mesh;
-        self.periodic = boundaries.periodic();
-    }
-
     /// Half-width of the band around the surface [m].
     pub fn eps(&self) -> f64 {
         self.eps
@@ -107,11 +61,6 @@ impl Locator {
     /// Narrow-band shapes of the grains.
     pub fn shapes(&self) -> &NarrowBandShapes {
         &self.shapes
-    }
-
-    /// Memory held [bytes].
-    pub fn bytes(&self) -> usize {
-        self.shapes.bytes()
     }
 
     /// Finds the neighbours of all grains, those whose spheres overlap, before [`Locator::locate`].
@@ -215,7 +164,7 @@ impl Locator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::Boundary;
+    use crate::flow::{Boundaries, Boundary};
     use grainwake_shape::Shape;
     use std::sync::Arc;
 

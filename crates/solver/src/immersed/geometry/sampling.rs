@@ -1,4 +1,5 @@
-//! Set-up of the narrow-band shapes: distances and mean distances sampled around each surface.
+//! Set-up of the geometry: width of the band, and the narrow-band shapes with distances and mean
+//! distances sampled around each surface.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -7,11 +8,33 @@ use glam::DVec3;
 use grainwake_shape::{Field, SampledField, Shape};
 use rayon::prelude::*;
 
-use super::aperture::band_variance;
+use super::Locator;
+use super::aperture::{band_variance, forcing_reach};
 use super::narrow_band::{NarrowBandShape, NarrowBandShapes};
 use super::samples::BandSamples;
-use crate::dem::Grain;
+use crate::dem::{BroadPhase, Grain};
+use crate::flow::Boundaries;
+use crate::grid::Mesh;
 use grainwake_simd::MAX_SINGLE_INDEX;
+
+/// Half-width of the band in mean spacings of the grid. With a narrower band the force on a grain
+/// depends more on where the grid lies; a wider one smooths thin boundary layers
+/// (`docs/decisions/0018-pressure-weight.md`).
+const BAND_HALF_WIDTH: f64 = 1.25;
+
+/// Half-width of the band around a surface, and distance up to which a grain affects faces [m].
+fn half_width_and_reach(mesh: &Mesh) -> [f64; 2] {
+    let spacings: Vec<f64> = mesh.resolved_axes().map(|axis| mesh.spacing[axis]).collect();
+    let eps = BAND_HALF_WIDTH * spacings.iter().sum::<f64>() / spacings.len().max(1) as f64;
+    // Half a link along the axis of the largest spacing beyond the reach of the forcing.
+    [eps, forcing_reach(eps) + 0.5 * spacings.into_iter().fold(0.0, f64::max)]
+}
+
+/// Expected memory of the distances sampled around the surface of a shape on a grid [bytes].
+/// Grains of one shape share them.
+pub fn narrow_band_bytes(mesh: &Mesh, shape: &Shape) -> f64 {
+    BandSamples::expected_bytes(shape, half_width_and_reach(mesh))
+}
 
 /// Least number of samples per half-width of the band.
 const SAMPLES_PER_BAND: f64 = 5.0;
@@ -19,6 +42,36 @@ const SAMPLES_PER_BAND: f64 = 5.0;
 const SAMPLES_ACROSS: f64 = 12.0;
 /// Largest number of samples per half-width of the band; the flow does not resolve a thinner grain.
 const MAX_SAMPLES_PER_BAND: f64 = 20.0;
+
+impl Locator {
+    /// Samples the shapes of `grains` for a grid.
+    pub fn new(mesh: &Mesh, boundaries: &Boundaries, grains: &[Grain]) -> Locator {
+        let [eps, reach] = half_width_and_reach(mesh);
+        Locator {
+            mesh: *mesh,
+            periodic: boundaries.periodic(),
+            eps,
+            reach,
+            shapes: NarrowBandShapes::new(grains, [eps, reach], mesh.resolved_axes().count()),
+            search: BroadPhase::default(),
+            spheres: Vec::new(),
+            pairs: Vec::new(),
+            neighbours: Vec::new(),
+            first_neighbour: Vec::new(),
+        }
+    }
+
+    /// Replaces the grid by one of the same spacing.
+    pub fn set_grid(&mut self, mesh: &Mesh, boundaries: &Boundaries) {
+        self.mesh = *mesh;
+        self.periodic = boundaries.periodic();
+    }
+
+    /// Memory held [bytes].
+    pub fn bytes(&self) -> usize {
+        self.shapes.bytes()
+    }
+}
 
 impl NarrowBandShapes {
     /// Samples the distances up to `reach` [m] from the surfaces; `eps` [m] is the half-width of
