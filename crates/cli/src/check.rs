@@ -81,7 +81,7 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         rows.push(("contact time", format!("{time} ({substeps:.0} sub-steps per time step)")));
     }
     rows.push(("time step", quantity(e.time_step_s, "s")));
-    rows.push(("steps", format!("{} to t = {} s", e.steps, case.plan.end)));
+    rows.push(("steps", format!("{} to t = {}", e.steps, end(case, e))));
     rows.extend(case.plan.probes.iter().map(|p| ("probe", probe(p))));
     let free =
         e.memory_free_bytes.map_or(String::new(), |free| format!(" ({} are free)", size(free)));
@@ -94,6 +94,15 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
         lines.push("no warnings".into());
     }
     lines.join("\n")
+}
+
+/// Describes the expected end of a run.
+fn end(case: &Case, e: &Estimate) -> String {
+    if e.end_s < case.plan.end {
+        format!("{} (expected landing)", quantity(e.end_s, "s"))
+    } else {
+        format!("{} s", case.plan.end)
+    }
 }
 
 /// Describes a probe: place, interval and file.

@@ -215,18 +215,16 @@ fn dry_run(
     }
     let cost = expected_cost(&to_do, plan, &records(plan, folder)?, folder);
     let time = clock(cost.wall_s / (jobs * threads) as f64);
-    let (most, reason) = match cost.basis {
-        0 => {
-            ("at most", "runs that stop early take less; finished runs improve the estimate".into())
-        }
-        n => ("about", format!("from {}", count(n, "finished run"))),
+    let basis = match cost.basis {
+        0 => "no run is finished; each finished run improves the estimate".into(),
+        n => format!("from {}", count(n, "finished run")),
     };
     let disk = cost
         .disk_bytes
         .map_or(String::new(), |bytes| format!(", {} of disk space", size(bytes as u64)));
     let largest = to_do.iter().map(|run| run.memory_bytes).max().unwrap_or(0);
     lines.push(format!(
-        "{} of {} to do: {most} {time} with {jobs} at once, {} each ({reason}); {} of memory{disk}",
+        "{} of {} to do: about {time} with {jobs} at once, {} each ({basis}); {} of memory{disk}",
         to_do.len(),
         states.len(),
         count(threads, "thread"),

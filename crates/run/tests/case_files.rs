@@ -1095,3 +1095,31 @@ region = { lower = [0, 0, "0.3 m"], upper = ["20 mm", "20 mm", "330 mm"] }
     );
     assert_eq!(case.setup.grains.len(), 1);
 }
+
+#[test]
+fn the_expected_landing_is_that_of_the_study() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let table = std::fs::read_to_string(root.join("results/dkt-morphology-members/table.csv"));
+    let table = table.unwrap();
+    let column = table.lines().next().unwrap().split(',').position(|name| name == "end_time_s");
+    let path = root.join("studies/dkt-morphology/case.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    for grain in ["01", "06", "09", "16"] {
+        let runs = table.lines().filter(|row| row.starts_with(&format!("g{grain}-o")));
+        let ends = runs.map(|row| row.split(',').nth(column.unwrap()).unwrap());
+        let ends: Vec<f64> = ends.map(|end| end.parse().unwrap()).collect();
+        let measured = ends.iter().sum::<f64>() / ends.len() as f64;
+        let set = [
+            "domain.size=[\"15 mm\", \"15 mm\", \"60 mm\"]".into(),
+            "grain.0.position=[\"7.5 mm\", \"7.5 mm\", \"48 mm\"]".into(),
+            format!("grain.0.file=\"grains/{grain}.grain\""),
+            format!("grain.1.file=\"grains/{grain}.grain\""),
+        ];
+        let case = Case::parse(&text, "case.toml", path.parent().unwrap(), &set).unwrap();
+        let expected = case.estimate(1).end_s;
+        println!("grain {grain}: {expected:.3} s, measured {measured:.3} s");
+        assert!((expected / measured - 1.0).abs() < 0.12, "{grain}: {expected} for {measured}");
+    }
+    // Without a stop at the landing the run goes on to its end.
+    assert_eq!(good(PAIR).estimate(1).end_s, 1.0);
+}

@@ -29,7 +29,9 @@ pub use aligned::Aligned;
 pub use complex::{Complex, as_complex, rotated_butterfly};
 pub use dispatch::{InstructionSet, dispatch, instructions, limit_instructions};
 pub use precision::Precision;
-pub use rows::{Maximum, Partial, RowWork, along_row, inner_lines, store_rows, window, window_mut};
+pub use rows::{
+    Maximum, Partial, RowWork, along_row, inner_lines, store_in_rows, window, window_mut,
+};
 pub use scalar::Scalar;
 pub use stencil::Stencil;
 pub use vector::{Kernel, Real, Registers, Vector};

@@ -1,4 +1,5 @@
-//! Loops along rows, and sums in an order that does not depend on the width of the registers.
+//! Loops along rows, windows and stores of rows, and sums in an order that does not depend on the
+//! width of the registers.
 
 use std::ops::Range;
 
@@ -66,10 +67,10 @@ pub fn window_mut<V: Vector>(list: &mut [V::Number], at: usize) -> &mut [V::Numb
     &mut list[at - 1..at + V::WIDTH + 1][1..][..V::WIDTH]
 }
 
-/// Stores entries `i` to `i + V::WIDTH` of three rows, with non-temporal stores if they lie in
-/// `lines`. The ends of a row, which boundary conditions read, stay in the cache.
+/// Stores entries `i` to `i + V::WIDTH` of each of three rows, with non-temporal stores if they lie
+/// in `lines`. The ends of a row, which boundary conditions read, stay in the cache.
 #[inline(always)]
-pub fn store_rows<V: Vector>(
+pub fn store_in_rows<V: Vector>(
     lines: &Range<usize>,
     i: usize,
     values: [V; 3],
@@ -88,7 +89,7 @@ pub fn store_rows<V: Vector>(
     }
 }
 
-/// Partial sum of a row in doubles, in an order that does not depend on the width.
+/// Sum over rows in doubles, lane by lane, in an order that does not depend on the width.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Partial([f64; MAX_LANES]);
@@ -113,7 +114,7 @@ impl Partial {
     }
 }
 
-/// Maximum of numbers of a row that are not negative, lane by lane.
+/// Maximum over rows of numbers that are not negative, lane by lane.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub struct Maximum<R>([R; MAX_LANES]);

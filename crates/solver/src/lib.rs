@@ -29,8 +29,8 @@
 //!
 //! `examples/` has longer programs: a settling sphere, a grain from a mesh, a custom diagnostic.
 //!
-//! Layers, each importing only from those before it:
-//! `math` -> `grid` -> `poisson`, `dem` -> `flow` -> `immersed` -> `sim`.
+//! Modules import downwards only: `math` < `grid` < `poisson` < `flow`; `math` < `dem`; both <
+//! `immersed` < `sim`.
 
 pub mod dem;
 pub mod flow;

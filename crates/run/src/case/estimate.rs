@@ -1,15 +1,19 @@
 //! Estimates before a run: Galileo number, settling speed, steps, memory, wall-clock time.
 
 use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
-use super::settling::{impact_speed, is_free};
+use super::settling::{impact_speed, is_free, landing_time};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
 use grainwake_shape::{Field, available_memory};
 use grainwake_solver::dem::Grain;
 use grainwake_solver::sim::Setup;
+use grainwake_solver::sim::events::StopWhen;
 
 /// Time of a step on one thread [ns per cell and byte of a number], from `grainwake bench`.
 const NS_PER_CELL_BYTE: f64 = 3.0;
+/// Time of a cell of the refined box over that of another cell: values pass to and from the box.
+/// From the `passes` of 65 models of `studies/dkt-morphology/members.toml`.
+const REFINED_CELL: f64 = 2.0;
 /// Time of the coupling in a step on one thread [ns per square of the diameter in cells], from the
 /// `passes` of `cases/dkt-pair/quick.toml` (12,000) and `cases/periodic-suspension/case.toml`
 /// (15,000). Spheres take half, grains that touch three times as much.
@@ -28,7 +32,10 @@ pub struct Estimate {
     pub cells: usize,
     /// Cells of the refined box at the start, if there is one.
     pub refined_cells: Option<usize>,
-    /// Steps expected until `end`.
+    /// Time at which the run is expected to end [s]: `end`, or the landing of the last grain with
+    /// `stop = "landing"`.
+    pub end_s: f64,
+    /// Steps expected until then.
     pub steps: u64,
     /// Time step expected at the settling speed [s].
     pub time_step_s: f64,
@@ -80,7 +87,10 @@ impl Estimate {
             (largest.zip(fluid)).map(|((_, grain, _), fluid)| terminal_speed(grain, fluid, g));
         let allowed = time_step(setup, speed.unwrap_or(0.0));
         let time_step_s = plan.intervals().fold(allowed, f64::min);
-        let steps = (plan.end / time_step_s).ceil();
+        let landing = plan.stop.as_ref().filter(|stop| stop.when == StopWhen::Landing);
+        let landing = landing.and_then(|stop| Some(landing_time(setup)? + stop.hold));
+        let end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));
+        let steps = (end_s / time_step_s).ceil();
 
         let cells = setup.mesh.cell_count();
         let refined_cells = setup.refined_mesh().map(|mesh| mesh.cell_count());
@@ -89,8 +99,8 @@ impl Estimate {
             .map(|t| (time_step_s / (t / setup.contact.substeps_per_contact)).max(1.0));
         let seconds = |ns: f64| ns * 1e-9 / threads.max(1) as f64;
         let field_bytes = fluid.map_or(0.0, |_| {
-            let cells = cells + refined_cells.unwrap_or(0);
-            cells as f64 * setup.precision.bytes() as f64
+            let cells = cells as f64 + REFINED_CELL * refined_cells.unwrap_or(0) as f64;
+            cells * setup.precision.bytes() as f64
         });
         // In a fluid the sub-steps of a contact are taken twice (decision 0014).
         let passes = if fluid.is_some() { 2.0 } else { 1.0 };
@@ -108,6 +118,7 @@ impl Estimate {
         Estimate {
             cells,
             refined_cells,
+            end_s,
             steps: steps as u64,
             time_step_s,
             memory_bytes: memory::needed(setup),

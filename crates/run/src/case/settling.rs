@@ -5,6 +5,7 @@ use glam::DVec3;
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
+use grainwake_solver::sim::events::EventParams;
 use grainwake_solver::sim::{Setup, StepRule};
 
 /// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
@@ -22,9 +23,35 @@ pub fn sphere_drag(reynolds: f64) -> f64 {
     if reynolds >= 1000.0 { 0.44 } else { 24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687)) }
 }
 
-/// Returns the settling Reynolds number of an unbounded sphere of this Galileo number:
-/// C_D Re^2 = 4/3 Ga^2.
+/// Factors by which the shape of a grain raises the drag of slow (k_S) and of fast flow (k_N), mean
+/// over the orientations (Bagheri & Bonadonna 2016), with the extents `a` >= `b` >= `c` [m], the
+/// equal-volume diameter `d` [m] and the density over that of the fluid.
+fn shape_factors([a, b, c]: [f64; 3], d: f64, density_ratio: f64) -> [f64; 2] {
+    let (flatness, elongation, box_part) = (c / b, b / a, d.powi(3) / (a * b * c));
+    let slow = (flatness * elongation.powf(1.3) * box_part).cbrt();
+    let fast = (flatness * flatness * elongation * box_part).min(1.0);
+    let ratio = density_ratio.log10();
+    let factor = 0.45 + 10.0 / ((2.5 * ratio).exp() + 30.0);
+    let exponent = 1.0 - 37.0 / ((3.0 * ratio).exp() + 100.0);
+    [0.5 * (slow + 1.0 / slow), 10.0_f64.powf(factor * (-fast.log10()).powf(exponent))]
+}
+
+/// Returns the drag coefficient of a grain for its equal-volume diameter by Bagheri and Bonadonna
+/// (2016), at least that of a sphere.
+fn grain_drag([slow, fast]: [f64; 2], reynolds: f64) -> f64 {
+    let re = reynolds * fast / slow;
+    let viscous = 24.0 * slow / reynolds * (1.0 + 0.125 * re.cbrt().powi(2));
+    sphere_drag(reynolds).max(viscous + 0.46 * fast / (1.0 + 5330.0 / re))
+}
+
+/// Returns the settling Reynolds number of an unbounded sphere of this Galileo number.
 pub fn settling_reynolds(galileo: f64) -> f64 {
+    reynolds_with(galileo, sphere_drag)
+}
+
+/// Returns the Reynolds number at which the drag balances the weight less buoyancy:
+/// C_D Re^2 = 4/3 Ga^2.
+fn reynolds_with(galileo: f64, drag: impl Fn(f64) -> f64) -> f64 {
     let wanted = 4.0 / 3.0 * galileo * galileo;
     if wanted <= 0.0 {
         return 0.0;
@@ -32,7 +59,7 @@ pub fn settling_reynolds(galileo: f64) -> f64 {
     let (mut low, mut high) = (1e-12_f64, 1e9_f64);
     for _ in 0..200 {
         let middle = (low * high).sqrt();
-        if sphere_drag(middle) * middle * middle < wanted { low = middle } else { high = middle }
+        if drag(middle) * middle * middle < wanted { low = middle } else { high = middle }
     }
     (low * high).sqrt()
 }
@@ -41,6 +68,43 @@ pub fn settling_reynolds(galileo: f64) -> f64 {
 pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
     settling_reynolds(galileo(grain, fluid, g)) * fluid.kinematic_viscosity
         / grain.shape.equivalent_diameter()
+}
+
+/// Returns the time at which the last free grain is expected to touch the floor [s]; `None` if
+/// there is no floor, or a grain does not fall.
+///
+/// In a fluid a grain falls at its terminal speed. From rest, under a drag that
+/// grows with the square of the speed, it arrives ln 2 relaxation times later.
+pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
+    let (g, density) = (setup.gravity.length(), setup.fluid.map_or(0.0, |fluid| fluid.density));
+    let EventParams { down, floor: (axis, side), .. } =
+        EventParams::for_grains(&setup.grains, setup.gravity, density, [None; 3]);
+    let (axis, side) = (axis as usize, side as usize);
+    if !matches!(setup.boundaries.0[axis][side], Boundary::Wall { .. } | Boundary::Slip) {
+        return None;
+    }
+    let floor = [setup.mesh.origin, setup.mesh.upper()][side][axis];
+    let time = |grain: &Grain| {
+        let radius = 0.5 * grain.shape.equivalent_diameter();
+        let height = (floor - grain.pose.position[axis]).abs() - radius;
+        let fall = height.max(0.0) / down[axis].abs();
+        let excess = (grain.density - density).abs();
+        let Some(fluid) = &setup.fluid else {
+            return (2.0 * fall / g).sqrt();
+        };
+        let (d, extents) = (2.0 * radius, grain.shape.morphology());
+        let shape = shape_factors([extents.a, extents.b, extents.c], d, grain.density / density);
+        let reynolds = reynolds_with(galileo(grain, fluid, g), |re| grain_drag(shape, re));
+        let speed = reynolds * fluid.kinematic_viscosity / d;
+        let relaxation = speed * (grain.density + 0.5 * density) / (excess * g);
+        fall / speed + std::f64::consts::LN_2 * relaxation
+    };
+    let free = setup.grains.iter().filter(|grain| is_free(grain));
+    let falls = |grain: &Grain| (grain.density - density) * setup.gravity.dot(down) > 0.0;
+    if !free.clone().all(falls) {
+        return None;
+    }
+    free.map(time).reduce(f64::max).filter(|time| time.is_finite())
 }
 
 /// Returns the speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without
@@ -141,5 +205,13 @@ mod tests {
         let re = settling_reynolds(0.1);
         assert!((re / (0.01 / 18.0) - 1.0).abs() < 0.01, "{re}");
         assert_eq!(settling_reynolds(0.0), 0.0);
+        // A sphere is as fast as before, a flat ellipsoid is slower.
+        let re = |extents: [f64; 3]| {
+            let d = extents.iter().product::<f64>().cbrt();
+            reynolds_with(198.1, |re| grain_drag(shape_factors(extents, d, 1.5), re))
+        };
+        assert!((re([1.0; 3]) / 271.0 - 1.0).abs() < 0.02, "{}", re([1.0; 3]));
+        let flat = re([2.0, 1.0, 0.5]);
+        assert!((140.0..170.0).contains(&flat), "{flat}");
     }
 }

@@ -130,7 +130,7 @@ pub enum Partner {
 
 impl Partner {
     /// Index of the partner, if it is a grain.
-    pub(super) fn grain(self) -> Option<usize> {
+    pub(crate) fn grain(self) -> Option<usize> {
         match self {
             Partner::Grain(index) => Some(index),
             Partner::Wall { .. } => None,

@@ -1,4 +1,4 @@
-//! Grain: a shared shape, density, material, pose and velocities.
+//! Grain: a shared shape, density, material, pose, velocities, and the constraints of its motion.
 
 use std::sync::Arc;
 
@@ -37,6 +37,19 @@ pub struct Material {
     pub poisson_ratio: f64,
     /// Coefficient of restitution; a pair takes the smaller of its two values.
     pub restitution: f64,
+}
+
+impl Default for Material {
+    /// Quartz without dissipation.
+    fn default() -> Self {
+        Material { youngs_modulus: 7e10, poisson_ratio: 0.17, restitution: 1.0 }
+    }
+}
+
+impl Material {
+    /// Undeformable body: the contact takes the elasticity and the restitution of its partner.
+    pub const RIGID: Material =
+        Material { youngs_modulus: f64::INFINITY, poisson_ratio: 0.0, restitution: 1.0 };
 }
 
 /// One grain. Velocities are at integer time levels, in the space frame.
@@ -104,6 +117,22 @@ impl Grain {
     /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.rigid_velocity().at(x - self.pose.position)
+    }
+    /// Kinetic energy of translation and rotation [J].
+    pub fn kinetic_energy(&self) -> f64 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        0.5 * self.mass() * self.velocity.length_squared()
+            + 0.5 * omega.dot(self.principal_inertia() * omega)
+    }
+    /// Linear momentum [kg m/s].
+    pub fn momentum(&self) -> DVec3 {
+        self.mass() * self.velocity
+    }
+    /// Angular momentum about the point `about` [kg m^2/s, space frame].
+    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
+        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
+        (self.pose.position - about).cross(self.momentum())
+            + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }
 

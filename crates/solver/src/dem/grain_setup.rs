@@ -1,4 +1,4 @@
-//! Set-up of a grain and its material; energy and momentum of a grain.
+//! Set-up of a grain.
 
 use std::sync::Arc;
 
@@ -7,19 +7,6 @@ use grainwake_shape::Shape;
 
 use super::grain::{Grain, Material, MotionConstraint};
 use crate::math::Pose;
-
-impl Default for Material {
-    /// Quartz without dissipation.
-    fn default() -> Self {
-        Material { youngs_modulus: 7e10, poisson_ratio: 0.17, restitution: 1.0 }
-    }
-}
-
-impl Material {
-    /// Undeformable body: the contact takes the elasticity and the restitution of its partner.
-    pub const RIGID: Material =
-        Material { youngs_modulus: f64::INFINITY, poisson_ratio: 0.0, restitution: 1.0 };
-}
 
 impl Grain {
     /// Free grain of `density` [kg/m^3] at rest at the origin.
@@ -64,21 +51,5 @@ impl Grain {
     pub fn held(mut self) -> Grain {
         self.hold();
         self
-    }
-    /// Kinetic energy of translation and rotation [J].
-    pub fn kinetic_energy(&self) -> f64 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        0.5 * self.mass() * self.velocity.length_squared()
-            + 0.5 * omega.dot(self.principal_inertia() * omega)
-    }
-    /// Linear momentum [kg m/s].
-    pub fn momentum(&self) -> DVec3 {
-        self.mass() * self.velocity
-    }
-    /// Angular momentum about the point `about` [kg m^2/s, space frame].
-    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        (self.pose.position - about).cross(self.momentum())
-            + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }

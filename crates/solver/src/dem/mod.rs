@@ -5,7 +5,7 @@
 //! 1. `motion`: sub-steps, integrator, rotation, response of the fluid, checkpoint of the contacts;
 //! 2. `contact`: force laws, friction history, lubrication;
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
-//! 4. `grain`, `enclosure`: the bodies and the box.
+//! 4. `grain`, its set-up in `grain_setup`, and `enclosure`: the bodies and the box.
 //!
 //! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
 //! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the

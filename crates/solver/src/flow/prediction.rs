@@ -1,5 +1,5 @@
-//! Prediction without the divergence constraint: tendency (advection and diffusion of Eq. 1b), one
-//! row at a time, and access of the immersed boundary to the prediction.
+//! Prediction without the divergence constraint: tendency (advection, diffusion and body
+//! acceleration of Eq. 1b), one row at a time, and access of the coupling to the prediction.
 //!
 //! Advection and diffusion are differences of fluxes through the six links to the neighbouring
 //! faces of the same component. The advective flux of a link is the mean of its two ends times the
@@ -7,8 +7,8 @@
 //! divergence-free.
 //!
 //! Legend: H tendency; q velocity component, c velocity through a link; u, v, w components along
-//! x, y, z, p pressure. Suffixes: c here, l/r left and right in x, m/p one row down and up in y,
-//! b/t one plane down and up in z; `umr` is u one row down, right.
+//! x, y, z, p pressure, a body acceleration. Suffixes: c here, l/r left and right in x, m/p one row
+//! down and up in y, b/t one plane down and up in z; `umr` is u one row down, right.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use super::{Boundaries, Flow, FluidParams};
 use crate::grid::{Centre, FaceVector, Field, Layout, Mesh, SharedRows, for_slabs};
 use crate::math::Real;
 use grainwake_simd::{
-    Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_rows, window,
+    Kernel, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_in_rows, window,
     window_mut,
 };
 
@@ -53,7 +53,7 @@ impl Coefficients {
         }
     }
 
-    /// -div(c q) + nu lap(q) + g of `component` at a face with value `q`, neighbours and link
+    /// -div(c q) + nu lap(q) + a of `component` at a face with value `q`, neighbours and link
     /// velocities (twice the mean) `[axis][minus, plus]`.
     #[inline(always)]
     fn at_face<V: Vector>(
@@ -237,7 +237,7 @@ impl<R: Real> RowWork for PredictRow<'_, R> {
             h.store(old);
             self.sums[axis].add(i, h);
         }
-        store_rows(&self.streamed, i, predicted, &mut self.predicted);
+        store_in_rows(&self.streamed, i, predicted, &mut self.predicted);
     }
 }
 

@@ -13,8 +13,8 @@ use crate::grid::{FaceVector, Layout, Mesh};
 use crate::math::Real;
 use crate::poisson::{Plane, Solution};
 use grainwake_simd::{
-    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_rows, window,
-    window_mut,
+    Kernel, Maximum, Partial, RowWork, Scalar, Vector, along_row, inner_lines, store_in_rows,
+    window, window_mut,
 };
 
 /// Measures of the flow over the whole grid after a projection.
@@ -24,7 +24,8 @@ pub struct FlowMeasures {
     pub max_divergence: f64,
     /// Largest sum of |u_a| / h_a of a cell [1/s].
     pub max_rate: f64,
-    /// Largest speed of a face [m/s].
+    /// Square root of the largest u^2 + v^2 + w^2 of a cell, with the velocities of its three lower
+    /// faces [m/s].
     pub max_velocity: f64,
     /// Kinetic energy of the box per density [m^5/s^2].
     pub kinetic_energy: f64,
@@ -305,7 +306,7 @@ impl<R: Real> RowWork for CorrectRow<'_, R> {
             divergence = divergence + (next - q) * inverse;
             self.partial.momentum[axis].add(i, q);
         }
-        store_rows(&self.streamed, i, corrected, &mut self.out);
+        store_in_rows(&self.streamed, i, corrected, &mut self.out);
         let p = window_mut::<V>(self.pressure, i);
         (V::load(p) + f).store(p);
         let partial = &mut *self.partial;

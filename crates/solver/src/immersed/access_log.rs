@@ -1,11 +1,11 @@
-//! Log of the faces that the threads use in a step, in debug builds.
+//! Log of the faces that the grains use while they are coupled, in debug builds.
 
 use std::sync::Mutex;
 
 use crate::grid::BorrowedRow;
 
-/// Rows of the prediction that the grains have borrowed in a step, to assert that no thread writes
-/// a face that another one uses; empty in release builds.
+/// Rows of the prediction that each grain has borrowed, to assert that no grain writes a face that
+/// another one uses at once; empty in release builds.
 #[derive(Default)]
 pub struct AccessLog(Mutex<Vec<(usize, BorrowedRow)>>);
 

@@ -26,8 +26,8 @@ use super::geometry::aperture::{aperture, forcing_reach, open_depth, open_depth_
 use super::geometry::{BandFaces, FaceRun, load_all};
 use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
-/// Forcing of a face by one grain, or by several together. The fractions are zero in the paper's
-/// scheme, which uses the weight alone.
+/// Forcing of a face by one grain, or by several together. Both fractions stay zero in the paper's
+/// scheme, whose `strength` follows from the solid fraction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).

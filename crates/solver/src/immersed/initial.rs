@@ -89,7 +89,7 @@ impl<R: Real> ImmersedGrains<R> {
                 *weight = if *distance < 0.0 { 1.0 } else { 0.0 };
             }
             for &(entry, x) in &band.shared {
-                let nearest = nearest_distance(neighbours, locator.shapes(), x, 0.0);
+                let nearest = nearest_distance(neighbours, &locator.shapes, x, 0.0);
                 if nearest < f64::from(band.distance[entry]) {
                     forced.weight[entry] = 0.0;
                 }

@@ -20,19 +20,19 @@ impl<R> ImmersedGrains<R> {
 impl ImmersedGrain {
     /// Memory held [bytes].
     fn bytes(&self) -> usize {
-        let lists = self.body.bytes() + self.forced.bytes() + bytes_of(&self.correction);
-        size_of::<ImmersedGrain>() + lists
+        size_of::<ImmersedGrain>()
+            + self.body.bytes()
+            + self.forced.bytes()
+            + bytes_of(&self.correction)
+            + bytes_of([&self.located_beside])
     }
 }
 
 impl LocatedBody {
     /// Memory held [bytes].
     fn bytes(&self) -> usize {
-        let tables = self.index_map.unknown_offsets.iter().flatten();
-        bytes_of(&self.distance)
-            + bytes_of(&self.spans)
-            + bytes_of(&self.rows)
-            + bytes_of(tables.chain(&self.index_map.offsets))
+        let lists = bytes_of(&self.distance) + bytes_of(&self.spans) + bytes_of(&self.rows);
+        lists + bytes_of(self.index_map.tables())
     }
 }
 

@@ -5,8 +5,9 @@
 //! each grain:
 //!
 //! 1. `advection.rs` corrects the prediction u* next to the last pose of the grain.
-//! 2. `geometry/mod.rs` lists the faces near the new pose. `geometry/distances.rs` evaluates their
-//!    signed distances d, `narrow_band.rs` interpolates d, `lists.rs` defines the lists.
+//! 2. `geometry/mod.rs` finds the neighbours of the grain and the box of cells around its new pose.
+//!    `geometry/distances.rs` lists the faces in this box with their signed distances d, which
+//!    `narrow_band.rs` and `samples.rs` interpolate; `lists.rs` defines the lists.
 //! 3. `forcing.rs` computes the weights of the forced faces: the drag, and the weight P of the
 //!    pressure gradient; `shared_faces.rs` those next to several grains.
 //! 4. `rigidity.rs` sums the impulse J on the fluid as an affine function of the six new
@@ -19,7 +20,7 @@
 //! film loads a grain, the caller (`sim/stages.rs`) repeats the contact sub-steps between 4 and 5,
 //! with `CoupledGrains::responses`.
 //!
-//! `links.rs` has the links of stage 1, `update.rs` the work on one grain. `open_sides.rs` and
+//! `links.rs` has the links of item 1, `update.rs` the work on one grain. `open_sides.rs` and
 //! `emerged.rs` treat grains that leave the box or float in a free surface, `initial.rs` sets the
 //! flow at t = 0. Every kernel has a plain scalar form in `reference/`, against which it is tested.
 

@@ -281,17 +281,12 @@ impl Crossing {
         }
     }
 
-    /// Weight less buoyancy of a grain in a fluid of `fluid_density` [kg/m^3].
-    pub fn weight_less_buoyancy(&self, grain: &Grain, gravity: DVec3, fluid_density: f64) -> Load {
-        if let Crossing::Left = self {
-            return Load::default();
-        }
-        let force = gravity * (grain.density - fluid_density) * grain.shape.volume();
-        let submerged = Load { force, torque: DVec3::ZERO };
-        self.emerged_part().map_or(submerged, |part| {
-            let weight = fluid_density * gravity;
-            submerged + Load { force: part.volume * weight, torque: part.moment.cross(weight) }
-        })
+    /// Weight of the fluid of density `fluid_density` [kg/m^3] that the part of a grain beyond a
+    /// free surface does not displace; none if the whole grain is in the fluid.
+    pub fn lost_buoyancy(&self, gravity: DVec3, fluid_density: f64) -> Option<Load> {
+        let part = self.emerged_part()?;
+        let weight = fluid_density * gravity;
+        Some(Load { force: part.volume * weight, torque: part.moment.cross(weight) })
     }
 }
 

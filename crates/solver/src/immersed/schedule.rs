@@ -81,7 +81,7 @@ pub struct RigidityInput<'a> {
 impl<R: Real> ImmersedGrains<R> {
     /// Parameters of the forcing in a step of `dt` [s].
     pub(super) fn forcing_params(&self, dt: f64) -> ForcingParams {
-        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
+        let (eps, nu) = (self.locator.eps, self.kinematic_viscosity);
         ForcingParams::new(self.scheme, eps, self.spacing, nu, dt)
     }
 
@@ -137,10 +137,10 @@ impl<R: Real> ImmersedGrains<R> {
         CoupledGrains { updates }
     }
 
-    /// Resets the updates and marks the isolated grains.
+    /// Finds the neighbours of all grains, resets the updates and marks the isolated grains.
     pub(super) fn find_isolated(&mut self, input: &CouplingInput, updates: &mut Vec<GrainUpdate>) {
         let (immersed, grains) = (&self.grains, input.grains);
-        let reach = self.locator.reach();
+        let reach = self.locator.reach;
         let displacement = |i: usize| grains[i].pose.position.distance(immersed[i].body.position);
         // A caller may have wrapped a grain into the box: its last faces are elsewhere.
         let stayed = |index: usize| displacement(index) <= reach;
@@ -167,7 +167,7 @@ impl<R: Real> ImmersedGrains<R> {
         updates: &[GrainUpdate],
     ) {
         let (known, _) = flow.prediction();
-        let (eps, nu) = (self.locator.eps(), self.kinematic_viscosity);
+        let (eps, nu) = (self.locator.eps, self.kinematic_viscosity);
         let scratch = &self.scratch;
         let each = self.grains.par_iter_mut().zip(updates).enumerate();
         let each = each.filter(|(_, (_, update))| !update.isolated);

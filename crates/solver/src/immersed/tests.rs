@@ -197,7 +197,7 @@ fn isolated_and_conflicting(
     flow.start_from(|axis, x| (1.5 * x).to_array()[(axis + 1) % 3].sin());
     let grain =
         |x: f64| Grain::new(Shape::sphere(0.5, 100), 2.0).with_position(DVec3::new(x, 1.52, 1.47));
-    let reach = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &[grain(1.55)]).locator.reach();
+    let reach = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &[grain(1.55)]).locator.reach;
     // Neighbours are half of the grains apart in the list, so two threads update them at once.
     let place = |n: usize| if 2 * n < count { 2 * n } else { 2 * n + 1 - count };
     let at = |n: usize| 1.55 + (1.0 + reaches * reach) * place(n) as f64;

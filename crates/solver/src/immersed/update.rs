@@ -20,14 +20,15 @@ use crate::math::{Load, Pose, Real, RigidVelocity};
 pub struct ImmersedGrain {
     /// Faces within reach and their distances.
     pub body: LocatedBody,
-    /// Forced faces; unused while the grain is isolated, as it then uses [`ThreadScratch`].
+    /// Forced faces; an isolated grain uses those of [`ThreadScratch`], and these only if a contact
+    /// load is found in the repeated sub-steps.
     pub forced: ForcedFaces,
     /// Correction of the advection; unused while the grain is isolated.
     pub correction: AdvectionCorrection,
     /// Pose of the grain and step for which its lists were made; none if they must be made again.
     pub located_for: Option<(Pose, f64)>,
     /// Neighbours for which the lists were made.
-    located_beside: Vec<NeighbourGrain>,
+    pub located_beside: Vec<NeighbourGrain>,
 }
 
 /// Progress of one grain in a step.
@@ -145,7 +146,7 @@ impl<R: Real> CouplingContext<'_, R> {
         let ThreadScratch { advection, locate, correction, forced } = scratch;
         *located_for = None;
         if self.params.scheme == Scheme::Aperture {
-            let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps());
+            let (kinematics, eps) = (&self.input.kinematics[index], self.locator.eps);
             let (nu, known) = (self.kinematic_viscosity, &self.known);
             find_correction(eps, nu, known, kinematics, body, advection, correction);
             for (component, prediction) in predictions.iter_mut().enumerate() {
@@ -227,7 +228,7 @@ pub fn locate_and_compute_weights(
     }
     locator.locate(index, grain, body, &mut forced.runs, scratch);
     forced.compute_weights(params, &mut scratch.band);
-    share_faces(params, &scratch.band, locator.neighbours(index), locator.shapes(), forced);
+    share_faces(params, &scratch.band, locator.neighbours(index), &locator.shapes, forced);
 }
 
 /// Buffers of the threads, kept from one step to the next.

@@ -3,9 +3,7 @@
 use std::fmt;
 
 use super::Simulation;
-use crate::dem::{
-    ContactLawKind, MotionConstraint, Outside, Partner, RelativeOverlap, Side, outside,
-};
+use crate::dem::{ContactLawKind, Outside, Partner, RelativeOverlap, Side, outside};
 
 /// Overlap for which a stiffness is suggested [smaller equivalent diameters].
 const SUGGESTED_OVERLAP: f64 = 0.01;
@@ -96,7 +94,8 @@ impl fmt::Display for Remedy {
 /// Failure of a step.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
-    /// The state is not finite, changes too fast, or grains overlap too far.
+    /// The state is not finite, the CFL number is too large, grains overlap too far, or a grain of
+    /// a run with a refined box reaches a free surface.
     #[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
     Unstable {
         /// Time [s].
@@ -147,21 +146,16 @@ impl Simulation {
         }
     }
 
-    /// Describes an overlap beyond the limit, with its remedy. No contact resists a prescribed
-    /// motion, so a pair without a free grain does not count.
-    pub(super) fn describe_overlap(&self, overlap: RelativeOverlap) -> Option<(String, Remedy)> {
+    /// Describes an overlap beyond the limit, with its remedy.
+    pub(super) fn describe_overlap(&self, overlap: RelativeOverlap) -> (String, Remedy) {
         let (params, grains) = (&self.setup.contact, &self.setup.grains);
         let RelativeOverlap { grain, partner, depth, relative } = overlap;
-        let free = |index: usize| grains[index].translation == MotionConstraint::Free;
         let (other, with) = match partner {
             Partner::Grain(other) => (Some(other), format!("grain {other}")),
             Partner::Wall { axis, side } => {
                 (None, format!("the {} wall", side_name(axis as usize, side as usize)))
             }
         };
-        if !free(grain) && !other.is_some_and(free) {
-            return None;
-        }
         let what = format!(
             "grain {grain} overlaps {with} by {:.4} mm, {:.1} % of the equivalent diameter; the \
              limit is {:.0} %",
@@ -178,6 +172,6 @@ impl Simulation {
                 ContactLawKind::Linear => params.normal_stiffness,
                 ContactLawKind::HertzMindlin => grains[grain].material.youngs_modulus,
             };
-        Some((what, Remedy::StifferContact { law: params.law, factor, value }))
+        (what, Remedy::StifferContact { law: params.law, factor, value })
     }
 }

@@ -24,9 +24,10 @@ pub(super) trait Fluid: Send + Sync {
     fn predict(&mut self, dt: f64);
     /// First projection of the paper's scheme.
     fn project_prediction(&mut self, dt: f64);
-    /// Locates the grains and assembles their equations of motion.
+    /// Locates the grains and assembles their equations of motion; isolated grains impose their
+    /// velocities at once.
     fn couple(&mut self, input: CouplingInput) -> CoupledGrains;
-    /// Solves for the velocities of the grains and imposes them on the forced faces.
+    /// Gives the grains their new velocities and imposes those of the other grains.
     fn impose_rigidity(&mut self, coupled: CoupledGrains, step: RigidityInput);
     /// Sets the outward speeds [m/s] of the fastest grains close to each side.
     fn set_crossing_speeds(&mut self, speeds: [[f64; 2]; 3]);

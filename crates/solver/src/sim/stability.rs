@@ -2,6 +2,7 @@
 
 use super::Simulation;
 use super::failure::{Remedy, StepError};
+use crate::dem::{MotionConstraint, Partner};
 use crate::immersed::OpenSides;
 
 /// CFL number above which a step counts as unstable.
@@ -12,8 +13,8 @@ impl Simulation {
     pub fn cfl(&self) -> f64 {
         self.fluid.as_ref().map_or(0.0, |fluid| fluid.measures().max_rate * self.clock.last_step)
     }
-    /// Checks that the state is finite, the overlaps within their limit and the CFL number below
-    /// its bound.
+    /// Checks that the state is finite, the overlaps are within their limit, the CFL number is
+    /// below its bound, and no grain of a run with a refined box reaches a free surface.
     pub(super) fn check_stability(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: Remedy| {
             Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy })
@@ -28,9 +29,14 @@ impl Simulation {
                 return unstable(what, Remedy::StepOrContact);
             }
         }
-        let limit = self.setup.contact.overlap_limit;
-        let overlap = self.largest_overlap().filter(|overlap| overlap.relative > limit);
-        if let Some((what, remedy)) = overlap.and_then(|overlap| self.describe_overlap(overlap)) {
+        // No contact resists a prescribed motion, so a pair without a free grain does not count.
+        let grains = &self.setup.grains;
+        let is_free = |grain: usize| grains[grain].translation == MotionConstraint::Free;
+        let counts =
+            |grain: usize, partner: Partner| is_free(grain) || partner.grain().is_some_and(is_free);
+        let overlap = self.data.dynamics.largest_overlap(grains, counts);
+        if let Some(overlap) = overlap.filter(|it| it.relative > self.setup.contact.overlap_limit) {
+            let (what, remedy) = self.describe_overlap(overlap);
             return unstable(what, remedy);
         }
         let emerged = self.data.open_sides.as_ref().and_then(OpenSides::emerged);

@@ -65,12 +65,18 @@ impl<'a> Start<'a> {
             let crossing =
                 data.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
             data.previous[i].velocity = grain.rigid_velocity();
-            data.applied[i] = crossing.weight_less_buoyancy(grain, setup.gravity, fluid_density);
+            // Weight less buoyancy.
+            let force = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
+            data.applied[i] = Load { force, torque: DVec3::ZERO };
+            if let Some(load) = crossing.lost_buoyancy(setup.gravity, fluid_density) {
+                data.applied[i] += load;
+            }
             if let Crossing::Departing(_) = crossing {
                 // Departing grains move under their last load: no added mass takes up a velocity.
                 data.previous[i].pending_added_mass_velocity = RigidVelocity::default();
             }
             if let Crossing::Left = crossing {
+                data.applied[i] = Load::default();
                 (data.previous[i], data.loads[i]) = (PreviousStep::default(), Load::default());
             } else if !data.external[i].is_zero() {
                 // A zero load is not added: it would turn -0.0 into 0.0.

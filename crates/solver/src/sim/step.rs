@@ -26,8 +26,9 @@ impl Simulation {
     /// If `horizon` is not positive.
     ///
     /// # Errors
-    /// [`StepError::Unstable`] if the state is no longer finite or the CFL number has jumped; the
-    /// simulation cannot be continued from such a state.
+    /// [`StepError::Unstable`] if the state is no longer finite, the CFL number has jumped, grains
+    /// overlap beyond their limit, or a grain of a run with a refined box reaches a free surface.
+    /// The simulation cannot be continued from such a state.
     pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {
         assert!(horizon > 0.0, "a step ends after the present time, not {horizon} s from it");
         let rate = (self.fluid.as_ref()).map_or(0.0, |fluid| fluid.measures().max_rate);

@@ -1,8 +1,10 @@
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
-use super::{CELL_FIELDS, PrescribedMotion, Prescription, Remedy, Setup, Simulation, StepRule};
-use crate::dem::Grain;
+use super::{
+    CELL_FIELDS, PrescribedMotion, Prescription, Remedy, Setup, Simulation, StepError, StepRule,
+};
+use crate::dem::{ContactParams, Grain, MotionConstraint, Partner};
 use crate::flow::{Boundary, FluidParams};
 use crate::grid::{Axis, Mesh};
 use crate::math::Precision;
@@ -98,4 +100,26 @@ fn an_instability_beside_an_open_face_names_the_grain_in_it() {
     assert_eq!(with_floor(Boundary::Outflow, 2.0).1, Remedy::StepOrGrid);
     // A grain that has left the box is no cause any more.
     assert_eq!(with_floor(Boundary::Outflow, f64::INFINITY).1, Remedy::StepOrGrid);
+}
+
+#[test]
+fn an_overlap_of_a_free_grain_is_found_beside_a_deeper_one_of_a_prescribed_pair() {
+    let shape = std::sync::Arc::new(Shape::sphere(0.4, 200));
+    let at = |x, z| Grain::new(shape.clone(), 2.0).with_position(DVec3::new(x, 2.0, z));
+    let held = MotionConstraint::Prescribed(DVec3::ZERO);
+    let held = |grain: Grain| Grain { translation: held, rotation: held, ..grain };
+    // Two held grains overlap by a quarter of their diameter; a third one sinks into the floor.
+    let mut contact = ContactParams { normal_stiffness: 8.0, ..ContactParams::default() };
+    contact.overlap_limit = 0.1;
+    let setup = Setup::new(Mesh::cubic([16, 16, 16], 0.25))
+        .with_gravity(DVec3::NEG_Z)
+        .with_contact(contact)
+        .with_grains([held(at(1.0, 2.0)), held(at(1.6, 2.0)), at(3.0, 0.42)])
+        .with_step(StepRule::Fixed(0.01));
+    let mut sim = Simulation::new(setup).unwrap();
+    let error = (0..200).find_map(|_| sim.step(f64::INFINITY).err()).expect("a soft contact");
+    let StepError::Unstable { what, .. } = error;
+    assert!(what.starts_with("grain 2 overlaps the lower z wall"), "{what}");
+    let largest = sim.largest_overlap().expect("a contact");
+    assert_eq!((largest.grain, largest.partner), (0, Partner::Grain(1)));
 }

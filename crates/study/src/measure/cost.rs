@@ -16,7 +16,8 @@ pub struct Cost {
     pub wall_s: f64,
     /// Size of their folders [bytes]; none if no finished run has a folder.
     pub disk_bytes: Option<f64>,
-    /// Number of finished runs from which the cost follows. If 0, the time is an upper limit.
+    /// Number of finished runs from which the cost follows. If 0, the time follows from the case
+    /// files alone.
     pub basis: usize,
 }
 
@@ -29,9 +30,8 @@ struct Done<'a> {
     disk: Option<f64>,
 }
 
-/// Estimates the cost of runs. The time that a case file allows is an upper limit, because runs
-/// stop early. It is scaled by the ratio of measured to estimated time of the finished runs, if
-/// possible of those with a similar grid.
+/// Estimates the cost of runs. The time estimated from a case file is scaled by the ratio of
+/// measured to estimated time of the finished runs, if possible of those with a similar grid.
 pub fn expected_cost(to_do: &[&Run], plan: &Plan, records: &[RunRecord], study: &Path) -> Cost {
     let runs = plan.runs.iter().zip(records).filter(|(_, record)| record.finished());
     let done: Vec<Done> = runs

@@ -2,12 +2,13 @@
 //! `hertz_mindlin.rs` have the force laws, `model.rs` the loads of a pair. At set-up,
 //! `parameters.rs` selects the law.
 //!
-//! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`, and needs one
-//! variant of [`ContactLawKind`], one arm of `ContactParams::force_law`, and its keys in the case
-//! file. A cohesive law overrides `ContactLaw::normal_force`, which is never negative by default. A
-//! force across a gap belongs beside the lubrication in `model.rs`: `ContactModel::range` makes
-//! pairs of this gap contacts, and `substeps.rs` chooses the sub-steps and takes the mean over the
-//! nodes in contact.
+//! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`. It needs a
+//! variant of [`ContactLawKind`], of which the compiler then names every `match`, its keys in the
+//! case file, and its name in `law_schema` there (`crates/run/src/case/raw/physics.rs`). A cohesive
+//! law overrides `ContactLaw::normal_force` and returns the pull from there: the elastic force that
+//! this function gets is at least zero. A force across a gap belongs beside the lubrication in
+//! `model.rs`: `ContactModel::range` makes pairs of this gap contacts, and `substeps.rs` chooses
+//! the sub-steps.
 
 mod hertz_mindlin;
 mod law;

@@ -112,7 +112,6 @@ impl ContactDynamics {
                 normal: input.vector()?,
             })
         })?;
-        self.largest_overlap = None;
         (self.last_positions, self.records, self.contacts) = (last_positions, records, contacts);
         Ok(())
     }

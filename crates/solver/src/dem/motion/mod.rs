@@ -29,8 +29,6 @@ pub struct ContactDynamics {
     model: ContactModel,
     enclosure: Enclosure,
     contacts: Vec<Contact>,
-    /// Deepest overlap of the last step relative to the smaller equivalent diameter.
-    largest_overlap: Option<RelativeOverlap>,
     /// Sub-steps of the last step.
     substeps: usize,
     /// Pairs that may touch, in ascending key.
@@ -59,7 +57,6 @@ impl ContactDynamics {
             model: ContactModel::new(params),
             enclosure,
             contacts: Vec::new(),
-            largest_overlap: None,
             substeps: 0,
             records: Vec::new(),
             last_positions: Vec::new(),
@@ -74,9 +71,20 @@ impl ContactDynamics {
         &self.contacts
     }
     /// Largest overlap at any sub-step of the last step, relative to the smaller equal-volume
-    /// diameter of the pair. `None` without contact, and after [`ContactDynamics::restore`].
-    pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
-        self.largest_overlap
+    /// diameter of the pair, among the pairs of a grain and its partner that `counts` accepts.
+    /// `None` without contact, and after [`ContactDynamics::restore`].
+    pub fn largest_overlap(
+        &self,
+        grains: &[Grain],
+        counts: impl Fn(usize, Partner) -> bool,
+    ) -> Option<RelativeOverlap> {
+        let pair = |record: &ContactRecord| (record.key.grain as usize, record.key.partner);
+        let deep = self.records.iter().filter(|record| record.deepest_overlap > 0.0);
+        let overlaps = deep.filter(|record| counts(pair(record).0, pair(record).1)).map(|record| {
+            let (grain, partner) = pair(record);
+            RelativeOverlap::of(grains, grain, partner, record.deepest_overlap)
+        });
+        overlaps.reduce(|most, other| if other.relative > most.relative { other } else { most })
     }
     /// Number of sub-steps of the last step; of a step repeated with the response of the fluid,
     /// those of the repetition.
@@ -160,14 +168,8 @@ impl ContactDynamics {
         self.last_positions.clear();
         self.last_positions.extend(grains.iter().map(|grain| grain.pose.position));
         self.contacts.clear();
-        self.largest_overlap = None;
         for record in self.records.iter().filter(|record| record.deepest_overlap > 0.0) {
             let grain = record.key.grain as usize;
-            let overlap =
-                RelativeOverlap::of(grains, grain, record.key.partner, record.deepest_overlap);
-            if self.largest_overlap.is_none_or(|known| overlap.relative > known.relative) {
-                self.largest_overlap = Some(overlap);
-            }
             self.contacts.push(Contact {
                 grain,
                 partner: record.key.partner,

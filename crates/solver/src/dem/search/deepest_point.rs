@@ -5,7 +5,7 @@ use glam::{DMat2, DVec2, DVec3};
 use grainwake_shape::Shape;
 
 use super::patches::PosedShape;
-use super::surface::{PartnerField, SurfacePoint, is_sphere, project_to_surface};
+use super::surface::{PartnerField, SurfacePoint, is_sphere};
 
 /// First and last radius of the compass search [node spacings].
 const COMPASS_RADII: [f64; 2] = [0.25, 0.02];
@@ -192,6 +192,42 @@ fn vertex(
     // Not finite if the distance does not curve.
     let by = -(hessian.inverse() * slope);
     (by.length() <= radius).then_some(by)
+}
+
+impl PartnerField<'_> {
+    /// Whether the partner is an exact sphere.
+    pub fn is_sphere(&self) -> bool {
+        matches!(self, PartnerField::Shape { shape, .. } if is_sphere(shape))
+    }
+    /// Point with the smallest distance on a sphere of `radius` [m] around the origin; `None` if
+    /// the partner is neither a sphere nor a wall, or a concentric sphere.
+    pub fn deepest_point_of_sphere(&self, radius: f64) -> Option<SurfacePoint> {
+        if !self.is_sphere() && !self.is_wall() {
+            return None;
+        }
+        let (_, gradient) = self.distance_and_gradient(DVec3::ZERO);
+        SurfacePoint::at(self, -radius * gradient.try_normalize()?)
+    }
+    /// Radius of curvature for the first step of a descent [m].
+    pub fn curvature_radius(&self) -> f64 {
+        match self {
+            PartnerField::Shape { shape, .. } => shape.bounding_radius(),
+            PartnerField::HalfSpace { .. } => f64::INFINITY,
+        }
+    }
+}
+
+/// Projection onto the surface by two Newton steps.
+fn project_to_surface(surface: &Shape, mut x: DVec3) -> DVec3 {
+    for _ in 0..2 {
+        let (distance, gradient) = surface.distance_and_gradient(x);
+        let square = gradient.length_squared();
+        if square < 0.25 {
+            break;
+        }
+        x -= gradient * (distance / square);
+    }
+    x
 }
 
 #[cfg(test)]

@@ -88,7 +88,8 @@ impl BroadPhase {
         self.pairs.sort_unstable();
     }
 
-    /// Lists the image of every grain inside the box and the images that reach into the box.
+    /// Lists the image of every grain inside the box, and the images that may touch a sphere whose
+    /// centre is in the box.
     fn list_images(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure) {
         self.centres.clear();
         let radii = spheres.iter().map(|sphere| sphere.radius);

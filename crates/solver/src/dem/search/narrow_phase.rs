@@ -11,7 +11,7 @@ use super::surface::{GRADIENT_MARGIN, PartnerField, SurfacePoint, is_sphere};
 /// Penetrating point of a pair, or the closest point of a pair without contact, space frame.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct ContactPoint {
-    /// Identifier of the patch; ascending within a pair.
+    /// Identifier of the surface patch; ascending within a pair.
     pub id: u32,
     /// Overlap d_i [m] (Eq. 7); negative across a gap.
     pub overlap: f64,
@@ -31,7 +31,8 @@ pub(in crate::dem) struct ContactPoint {
 pub(in crate::dem) struct ContactPatch {
     /// Penetrating points, in ascending identifier.
     pub points: Vec<ContactPoint>,
-    /// Lower bound of the distance between the surfaces [m]; not positive if unknown.
+    /// Lower bound of the distance between the surfaces, less the range of lubrication [m]; not
+    /// positive if unknown.
     pub separation: f64,
     /// Results of the last search of each surface.
     memory: [SurfaceMemory; 2],
@@ -181,7 +182,8 @@ const SECOND_GRAIN: u32 = 1 << 31;
 /// Identifier of the deepest point of a sphere, which is no patch.
 const DEEPEST_POINT: u32 = SECOND_GRAIN - 1;
 
-/// Range of the search for the nearest patch [node spacings]; bounds the separation of the pair.
+/// Range of the search for the nearest patch over the distance up to which it matters; bounds the
+/// separation of the pair.
 const SEARCH_RANGE: f64 = 3.0;
 /// Largest distance of a point of a sphere from the nearest node [node spacings].
 const NODE_COVERAGE: f64 = 1.2;

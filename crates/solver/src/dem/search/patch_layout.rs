@@ -1,5 +1,6 @@
-//! Set-up of the patches of a sampled surface: one around each node of the shape, and further ones
-//! where the surface bulges out between the nodes.
+//! Positions and arcs of the patches of a sampled surface, found in the first step with a shape:
+//! one patch around each node of the shape, and further ones where the surface is strongly curved
+//! between the nodes.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Set-up of the hierarchy of the surface patches of a shape.
+//! Hierarchy of the surface patches of a shape, built in the first step with it.
 
 use grainwake_shape::Shape;
 

@@ -1,5 +1,5 @@
 //! Patches of a surface at which it touches others, and their hierarchy. `patch_layout.rs` and
-//! `patch_tree.rs` build them at set-up, once for each shape.
+//! `patch_tree.rs` build them in the first step with a shape.
 //!
 //! In another grain a patch counts with its middle. On a wall it has arcs of circles where the
 //! surface is convex and smooth, so that a rounded grain rolls smoothly. Patches are fixed to the

@@ -93,26 +93,6 @@ impl<'a> PartnerField<'a> {
     pub fn is_wall(&self) -> bool {
         matches!(self, PartnerField::HalfSpace { .. })
     }
-    /// Whether the partner is an exact sphere.
-    pub fn is_sphere(&self) -> bool {
-        matches!(self, PartnerField::Shape { shape, .. } if is_sphere(shape))
-    }
-    /// Point with the smallest distance on a sphere of `radius` [m] around the origin; `None` if
-    /// the partner is neither a sphere nor a wall, or a concentric sphere.
-    pub fn deepest_point_of_sphere(&self, radius: f64) -> Option<SurfacePoint> {
-        if !self.is_sphere() && !self.is_wall() {
-            return None;
-        }
-        let (_, gradient) = self.distance_and_gradient(DVec3::ZERO);
-        SurfacePoint::at(self, -radius * gradient.try_normalize()?)
-    }
-    /// Radius of curvature for the first step of a descent [m].
-    pub fn curvature_radius(&self) -> f64 {
-        match self {
-            PartnerField::Shape { shape, .. } => shape.bounding_radius(),
-            PartnerField::HalfSpace { .. } => f64::INFINITY,
-        }
-    }
 }
 
 /// Point of a grain's surface with the partner's distance there, principal frame of the grain.
@@ -140,17 +120,4 @@ impl SurfacePoint {
 /// Whether the shape is an exact sphere.
 pub(crate) fn is_sphere(shape: &Shape) -> bool {
     matches!(shape.field(), Field::Sphere(_))
-}
-
-/// Projection onto the surface by two Newton steps.
-pub(super) fn project_to_surface(surface: &Shape, mut x: DVec3) -> DVec3 {
-    for _ in 0..2 {
-        let (distance, gradient) = surface.distance_and_gradient(x);
-        let square = gradient.length_squared();
-        if square < 0.25 {
-            break;
-        }
-        x -= gradient * (distance / square);
-    }
-    x
 }

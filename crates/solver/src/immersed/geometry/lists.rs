@@ -180,9 +180,9 @@ const NONE: usize = 1 << 60;
 pub struct IndexMap {
     /// Offsets of unknowns by axis, `[0]` for cells and faces parallel to the axis, `[1]` for faces
     /// normal to it; `NONE` elsewhere. Entry 0 is the offset of cell `-PAD` of the box.
-    pub(in crate::immersed) unknown_offsets: [[Vec<usize>; 2]; 3],
+    unknown_offsets: [[Vec<usize>; 2]; 3],
     /// Offsets of all entries of a field by axis, ghost cells beyond walls included.
-    pub(in crate::immersed) offsets: [Vec<usize>; 3],
+    offsets: [Vec<usize>; 3],
 }
 
 /// Unknown faces of one row that are adjacent in memory.
@@ -292,6 +292,11 @@ impl IndexMap {
                 }
             }
         }
+    }
+
+    /// All tables of offsets.
+    pub fn tables(&self) -> impl Iterator<Item = &Vec<usize>> {
+        self.unknown_offsets.iter().flatten().chain(&self.offsets)
     }
 }
 

@@ -1,8 +1,9 @@
 //! Geometry of grains on the grid: neighbours that share faces, boxes of cells, distances and lists
 //! of faces.
 //!
-//! [`Locator`] fills the lists (`lists.rs`) with the distances of `distances.rs` and
-//! `narrow_band.rs`; `aperture.rs` gives the aperture of a face or link.
+//! [`Locator`] fills the lists (`lists.rs`) by `distances.rs`, with the distances of
+//! `narrow_band.rs` and `samples.rs`. `sampling.rs` is their set-up; `aperture.rs` gives the
+//! aperture of a face or link.
 
 pub mod aperture;
 mod distances;
@@ -32,10 +33,11 @@ pub struct Locator {
     mesh: Mesh,
     periodic: [bool; 3],
     /// Half-width of the band around the surface [m].
-    eps: f64,
+    pub eps: f64,
     /// Distance from the surface up to which a grain affects faces [m].
-    reach: f64,
-    shapes: NarrowBandShapes,
+    pub reach: f64,
+    /// Narrow-band shapes of the grains.
+    pub shapes: NarrowBandShapes,
     search: BroadPhase,
     spheres: Vec<BoundingSphere>,
     /// Both directions of all pairs: grain, other grain, and periods between the image of the
@@ -48,21 +50,6 @@ pub struct Locator {
 }
 
 impl Locator {
-    /// Half-width of the band around the surface [m].
-    pub fn eps(&self) -> f64 {
-        self.eps
-    }
-
-    /// Distance from the surface up to which a grain affects faces [m].
-    pub fn reach(&self) -> f64 {
-        self.reach
-    }
-
-    /// Narrow-band shapes of the grains.
-    pub fn shapes(&self) -> &NarrowBandShapes {
-        &self.shapes
-    }
-
     /// Finds the neighbours of all grains, those whose spheres overlap, before [`Locator::locate`].
     /// A sphere contains all faces within reach of the surface of grain i, and `displacement(i)`
     /// [m] extends it to the last pose of the grain, whose faces count as well; 0 if they do not.

@@ -80,7 +80,7 @@ impl Case {
         });
         let mut locator = Locator::new(&mesh, &boundaries, &grains);
         locator.find_neighbours(&grains, |_| 0.0);
-        let eps = locator.eps();
+        let eps = locator.eps;
         let params = ForcingParams::new(scheme, eps, mesh.spacing, NU, DT);
         let scratch = &mut LocateScratch::default();
         let located = grains.iter().enumerate().map(|(index, grain)| {
@@ -166,23 +166,23 @@ fn distances_to_faces_match_the_reference() {
         // The samples of the ellipsoid are interpolated. Below the depth eps, where no weight
         // depends on the distance, the medial axis is near and interpolation is poor; beyond the
         // band the samples end.
-        let eps = case.locator.eps();
+        let eps = case.locator.eps;
         let tolerance_at = |d: f64| match SPHERES.contains(&index) {
             true => 1e-6,
             false if d > -eps && d < forcing_reach(eps) => 1e-3,
             false => 1e-2,
         };
-        let tolerance = tolerance_at(case.locator.reach());
+        let tolerance = tolerance_at(case.locator.reach);
         for component in 0..3 {
             let distances = &body.distance[component];
             let distances = case.by_row(index, component, distances, f64::INFINITY);
             for face in reference.faces(component) {
                 let found = distances[reference.at(face)];
                 match reference.distance(index, component, face) {
-                    Some(d) if d < case.locator.reach() - tolerance => {
+                    Some(d) if d < case.locator.reach - tolerance => {
                         assert_close(found, d, tolerance_at(d), "distance");
                     }
-                    Some(_) => assert!(found > case.locator.reach() - tolerance),
+                    Some(_) => assert!(found > case.locator.reach - tolerance),
                     None => {
                         nearer_to_another += 1;
                         assert_eq!(found, f64::INFINITY);
@@ -243,7 +243,7 @@ fn weights_of_forced_faces_match_the_reference() {
 #[test]
 fn weights_of_links_match_the_reference() {
     let case = Case::new(Scheme::Aperture);
-    let (reference, eps) = (&case.reference, case.locator.eps());
+    let (reference, eps) = (&case.reference, case.locator.eps);
     let mut links = [0; 2];
     for index in SPHERES {
         let (body, _) = &case.located[index];
@@ -273,7 +273,7 @@ fn weights_of_links_match_the_reference() {
 #[test]
 fn the_advection_correction_matches_the_reference() {
     let mut case = Case::new(Scheme::Aperture);
-    let eps = case.locator.eps();
+    let eps = case.locator.eps;
     let mut largest = [0.0_f64; 2];
     // At the smaller viscosity the excess is limited.
     for (nu, largest) in [NU, 1e-4].into_iter().zip(&mut largest) {
