@@ -23,7 +23,7 @@ LEFT_OUT = {
     "opt-in feature": "flow/open_boundary.rs immersed/open_sides.rs",
     "stopwatch": "math/pool_clock.rs math/time_spent.rs sim/timing.rs",
     "assertion of debug builds": "grid/borrowed.rs immersed/access_log.rs",
-    "set-up": "lib.rs sim/mod.rs immersed/mod.rs dem/search/patch_layout.rs dem/search/patch_tree.rs",
+    "set-up": "sim/mod.rs immersed/mod.rs dem/search/patch_layout.rs dem/search/patch_tree.rs",
 }
 SOLVER = Path("crates/solver/src").resolve()
 
@@ -75,7 +75,8 @@ def main(program):
     lines = subprocess.run(
         ["addr2line", "-i", "-e", program], input=query, check=True, capture_output=True, text=True
     ).stdout
-    places = {line.split(" ")[0].rsplit(":", 1)[0] for line in lines.splitlines()}
+    found = (re.match(r"(.+):([1-9]\d*)", line) for line in lines.splitlines())
+    places = {place[1] for place in found if place}
     files = sorted(path for path in map(Path, places) if path.is_relative_to(SOLVER))
     table = csv.writer(sys.stdout, lineterminator="\n")
     table.writerow(["file", "lines", "part"])

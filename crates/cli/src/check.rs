@@ -98,8 +98,8 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
 
 /// Describes the expected end of a run.
 fn end(case: &Case, e: &Estimate) -> String {
-    if e.end_s < case.plan.end {
-        format!("{} (expected landing)", quantity(e.end_s, "s"))
+    if e.expected_end_s < case.plan.end {
+        format!("{} (expected landing)", quantity(e.expected_end_s, "s"))
     } else {
         format!("{} s", case.plan.end)
     }

@@ -216,7 +216,7 @@ fn dry_run(
     let cost = expected_cost(&to_do, plan, &records(plan, folder)?, folder);
     let time = clock(cost.wall_s / (jobs * threads) as f64);
     let basis = match cost.basis {
-        0 => "no run is finished; each finished run improves the estimate".into(),
+        0 => "no run is finished; runs that stop at rest or separation count to their end".into(),
         n => format!("from {}", count(n, "finished run")),
     };
     let disk = cost

@@ -78,6 +78,7 @@ pub fn store_in_rows<V: Vector>(
 ) {
     let [x, y, z] = rows;
     let [x, y, z] = [window_mut::<V>(x, i), window_mut::<V>(y, i), window_mut::<V>(z, i)];
+    // `lines.contains(&i)` by one comparison.
     if i.wrapping_sub(lines.start) < lines.end - lines.start {
         values[0].store_non_temporal(x);
         values[1].store_non_temporal(y);

@@ -29,8 +29,8 @@
 //!
 //! `examples/` has longer programs: a settling sphere, a grain from a mesh, a custom diagnostic.
 //!
-//! Modules import downwards only: `math` < `grid` < `poisson` < `flow`; `math` < `dem`; both <
-//! `immersed` < `sim`.
+//! Modules import downwards only: `math` < `grid` < `poisson` < `flow`; `math` < `dem`; `flow` and
+//! `dem` < `immersed` < `sim`.
 
 pub mod dem;
 pub mod flow;

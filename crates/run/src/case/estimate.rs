@@ -12,7 +12,8 @@ use grainwake_solver::sim::events::StopWhen;
 /// Time of a step on one thread [ns per cell and byte of a number], from `grainwake bench`.
 const NS_PER_CELL_BYTE: f64 = 3.0;
 /// Time of a cell of the refined box over that of another cell: values pass to and from the box.
-/// From the `passes` of 65 models of `studies/dkt-morphology/members.toml`.
+/// Chosen so that the processor time of the 65 first members of
+/// `studies/dkt-morphology/members.toml` is met.
 const REFINED_CELL: f64 = 2.0;
 /// Time of the coupling in a step on one thread [ns per square of the diameter in cells], from the
 /// `passes` of `cases/dkt-pair/quick.toml` (12,000) and `cases/periodic-suspension/case.toml`
@@ -34,7 +35,7 @@ pub struct Estimate {
     pub refined_cells: Option<usize>,
     /// Time at which the run is expected to end [s]: `end`, or the landing of the last grain with
     /// `stop = "landing"`.
-    pub end_s: f64,
+    pub expected_end_s: f64,
     /// Steps expected until then.
     pub steps: u64,
     /// Time step expected at the settling speed [s].
@@ -89,8 +90,8 @@ impl Estimate {
         let time_step_s = plan.intervals().fold(allowed, f64::min);
         let landing = plan.stop.as_ref().filter(|stop| stop.when == StopWhen::Landing);
         let landing = landing.and_then(|stop| Some(landing_time(setup)? + stop.hold));
-        let end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));
-        let steps = (end_s / time_step_s).ceil();
+        let expected_end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));
+        let steps = (expected_end_s / time_step_s).ceil().max(1.0);
 
         let cells = setup.mesh.cell_count();
         let refined_cells = setup.refined_mesh().map(|mesh| mesh.cell_count());
@@ -118,7 +119,7 @@ impl Estimate {
         Estimate {
             cells,
             refined_cells,
-            end_s,
+            expected_end_s,
             steps: steps as u64,
             time_step_s,
             memory_bytes: memory::needed(setup),

@@ -1,5 +1,7 @@
 //! Settling of grains in closed form: Galileo number, settling speed, impact speed, time step.
 
+use std::f64::consts::{FRAC_PI_4, LN_2};
+
 use glam::DVec3;
 
 use grainwake_solver::dem::{Grain, MotionConstraint};
@@ -71,16 +73,24 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
 }
 
 /// Returns the time at which the last free grain is expected to touch the floor [s]; `None` if
-/// there is no floor, or a grain does not fall.
+/// there is no floor, a grain does not fall, the grains cover the floor (the last ones rest on
+/// others), or something else drives the fluid.
 ///
-/// In a fluid a grain falls at its terminal speed. From rest, under a drag that
-/// grows with the square of the speed, it arrives ln 2 relaxation times later.
+/// Without fluid a grain falls freely. In a fluid it falls at its terminal speed, ln 2 relaxation
+/// times later, as from rest under a drag that grows with the square of the speed. Velocities at
+/// the start and other walls are left out.
 pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
     let (g, density) = (setup.gravity.length(), setup.fluid.map_or(0.0, |fluid| fluid.density));
     let EventParams { down, floor: (axis, side), .. } =
         EventParams::for_grains(&setup.grains, setup.gravity, density, [None; 3]);
     let (axis, side) = (axis as usize, side as usize);
     if !matches!(setup.boundaries.0[axis][side], Boundary::Wall { .. } | Boundary::Slip) {
+        return None;
+    }
+    let cross_section = |grain: &Grain| grain.shape.equivalent_diameter().powi(2) * FRAC_PI_4;
+    let covered: f64 = setup.grains.iter().map(cross_section).sum();
+    let extent = setup.mesh.extent();
+    if covered > 0.5 * extent.element_product() / extent[axis] || is_driven(setup) {
         return None;
     }
     let floor = [setup.mesh.origin, setup.mesh.upper()][side][axis];
@@ -97,7 +107,7 @@ pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
         let reynolds = reynolds_with(galileo(grain, fluid, g), |re| grain_drag(shape, re));
         let speed = reynolds * fluid.kinematic_viscosity / d;
         let relaxation = speed * (grain.density + 0.5 * density) / (excess * g);
-        fall / speed + std::f64::consts::LN_2 * relaxation
+        fall / speed + LN_2 * relaxation
     };
     let free = setup.grains.iter().filter(|grain| is_free(grain));
     let falls = |grain: &Grain| (grain.density - density) * setup.gravity.dot(down) > 0.0;
@@ -105,6 +115,22 @@ pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
         return None;
     }
     free.map(time).reduce(f64::max).filter(|time| time.is_finite())
+}
+
+/// Returns whether anything but grains drives the fluid.
+fn is_driven(setup: &Setup) -> bool {
+    let still = |side: &Boundary| match side {
+        Boundary::Wall { velocity } | Boundary::Inflow { velocity } => *velocity == DVec3::ZERO,
+        _ => true,
+    };
+    let given = &setup.prescription;
+    let fluid_moves = |fluid: FluidParams| {
+        fluid.body_acceleration != DVec3::ZERO || fluid.initial_velocity != DVec3::ZERO
+    };
+    setup.fluid.is_some_and(fluid_moves)
+        || given.body_acceleration.is_some()
+        || given.initial_velocity.is_some()
+        || !setup.boundaries.0.iter().flatten().all(still)
 }
 
 /// Returns the speed at which a grain may hit a wall [m/s]: 1.5 times its settling speed, without
@@ -205,7 +231,7 @@ mod tests {
         let re = settling_reynolds(0.1);
         assert!((re / (0.01 / 18.0) - 1.0).abs() < 0.01, "{re}");
         assert_eq!(settling_reynolds(0.0), 0.0);
-        // A sphere is as fast as before, a flat ellipsoid is slower.
+        // A sphere is as fast as before, a flat ellipsoid takes about half as long again.
         let re = |extents: [f64; 3]| {
             let d = extents.iter().product::<f64>().cbrt();
             reynolds_with(198.1, |re| grain_drag(shape_factors(extents, d, 1.5), re))

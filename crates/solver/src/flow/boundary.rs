@@ -125,9 +125,9 @@ impl Boundaries {
             (Boundary::Wall { velocity } | Boundary::Inflow { velocity }, Some(component)) => {
                 GhostRule::Wall(velocity[component])
             }
-            // The pressure on every side, outflows included; velocity along slip, outflow and free
-            // surface.
-            (_, None) | (_, Some(_)) => GhostRule::ZeroGradient,
+            // The pressure on every side, `Outflow` included; the velocity along slip, outflow and
+            // free surface.
+            _ => GhostRule::ZeroGradient,
         })
     }
 

@@ -138,8 +138,9 @@ impl<R: Real> Kernel for PredictPlane<'_, R> {
     }
 }
 
-/// Restores the sums from `before` a row for the components whose faces on the whole row have a
-/// prescribed velocity: these are no unknowns.
+/// Takes a row out of the sums of the components that are `prescribed` on all its faces, which are
+/// not unknown: sets them back to their values `before` the row. The loop along the row thus needs
+/// no branch.
 #[inline(always)]
 pub fn undo_prescribed(
     sums: &mut [Partial; 3],

@@ -1,5 +1,4 @@
-//! Values of whole fields for the start of a run: from positions, from the rows of a checkpoint,
-//! and on the boundary of the box.
+//! Values of whole fields for the start of a run: from positions, or from the rows of a checkpoint.
 
 use glam::DVec3;
 

@@ -120,9 +120,9 @@ mod tests {
         let nowhere = folder.path();
         let to_do = [&plan.runs[3]];
         let none: Vec<RunRecord> = (0..4).map(|_| record(None)).collect();
-        let limit = expected_cost(&to_do, &plan, &none, nowhere);
-        assert_eq!(limit, Cost { wall_s: 20.0, disk_bytes: None, basis: 0 });
-        // 12 s on one thread and 4 s on two threads where 40 s were allowed: a half.
+        let expected = expected_cost(&to_do, &plan, &none, nowhere);
+        assert_eq!(expected, Cost { wall_s: 20.0, disk_bytes: None, basis: 0 });
+        // 12 s on one thread and 4 s on two threads where 40 s were expected: a half.
         let mut some = none.clone();
         some[0] = record(Some((12.0, 1)));
         some[1] = record(Some((4.0, 2)));

@@ -77,7 +77,7 @@ pub struct Run {
     pub end_s: f64,
     /// Estimated memory [bytes].
     pub memory_bytes: u64,
-    /// Estimated wall-clock time on one thread up to the latest end [s].
+    /// Estimated wall-clock time on one thread up to the expected end [s].
     pub wall_s: f64,
 }
 

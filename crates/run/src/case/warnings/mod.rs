@@ -17,7 +17,7 @@ use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
 /// Number of steps that suggests a wrong unit.
-const ABSURD_STEPS: u64 = 100_000_000;
+const ABSURD_STEPS: f64 = 100_000_000.0;
 /// Densities of grains that do not suggest a wrong unit [kg/m^3], from foam to osmium.
 const ORDINARY_DENSITIES: std::ops::RangeInclusive<f64> = 5.0..=25_000.0;
 /// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
@@ -30,7 +30,7 @@ pub(super) fn warnings(
     expect: &[Expectation],
     e: &Estimate,
 ) -> Vec<String> {
-    let mut found = wrong_units(setup, e);
+    let mut found = wrong_units(setup, plan, e);
     found.extend(resolution::resolution_and_cost(setup, e));
     found.extend(contact::deep_impacts(setup));
     found.extend(contact::long_substeps(setup));
@@ -225,9 +225,10 @@ fn flat_box(setup: &Setup) -> Vec<String> {
 }
 
 /// Numbers that suggest a wrong unit.
-fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
+fn wrong_units(setup: &Setup, plan: &RunPlan, e: &Estimate) -> Vec<String> {
     let mut found = Vec::new();
-    if e.steps > ABSURD_STEPS {
+    let steps = plan.end / e.time_step_s;
+    if steps > ABSURD_STEPS {
         let viscous = matches!(setup.step, StepRule::Limits { .. }) && setup.fluid.is_some();
         let cause = if viscous {
             "look at the units of viscosity, cell_size and time.end"
@@ -236,7 +237,7 @@ fn wrong_units(setup: &Setup, e: &Estimate) -> Vec<String> {
         };
         found.push(format!(
             "{:.1e} steps of {} to the end are more than can be run: {cause}",
-            e.steps as f64,
+            steps,
             quantity(e.time_step_s, "s")
         ));
     }

@@ -3,8 +3,9 @@
 //! `parameters.rs` selects the law.
 //!
 //! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`. It needs a
-//! variant of [`ContactLawKind`], of which the compiler then names every `match`, its keys in the
-//! case file, and its name in `law_schema` there (`crates/run/src/case/raw/physics.rs`). A cohesive
+//! variant of [`ContactLawKind`], of which the compiler then names every `match` (in `crates/run`
+//! some code compares with `Linear` alone), its keys in the case file, and its name in `law_schema`
+//! there (`crates/run/src/case/raw/physics.rs`). A cohesive
 //! law overrides `ContactLaw::normal_force` and returns the pull from there: the elastic force that
 //! this function gets is at least zero. A force across a gap belongs beside the lubrication in
 //! `model.rs`: `ContactModel::range` makes pairs of this gap contacts, and `substeps.rs` chooses
