@@ -73,8 +73,8 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
 }
 
 /// Returns the time at which the last free grain is expected to touch the floor [s]; `None` if
-/// there is no floor, a grain does not fall, the grains cover the floor (the last ones rest on
-/// others), or something else drives the fluid.
+/// there is no floor, a grain does not fall, something else drives the fluid, or the grains cover
+/// half of the floor, so that some may come to rest on others.
 ///
 /// Without fluid a grain falls freely. In a fluid it falls at its terminal speed, ln 2 relaxation
 /// times later, as from rest under a drag that grows with the square of the speed. Velocities at
@@ -231,13 +231,13 @@ mod tests {
         let re = settling_reynolds(0.1);
         assert!((re / (0.01 / 18.0) - 1.0).abs() < 0.01, "{re}");
         assert_eq!(settling_reynolds(0.0), 0.0);
-        // A sphere is as fast as before, a flat ellipsoid takes about half as long again.
+        // A sphere is as fast as before; by the formulas a flat ellipsoid has 0.57 of its speed.
         let re = |extents: [f64; 3]| {
             let d = extents.iter().product::<f64>().cbrt();
             reynolds_with(198.1, |re| grain_drag(shape_factors(extents, d, 1.5), re))
         };
         assert!((re([1.0; 3]) / 271.0 - 1.0).abs() < 0.02, "{}", re([1.0; 3]));
         let flat = re([2.0, 1.0, 0.5]);
-        assert!((140.0..170.0).contains(&flat), "{flat}");
+        assert!((flat / 153.3 - 1.0).abs() < 1e-3, "{flat}");
     }
 }

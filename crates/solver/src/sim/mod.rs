@@ -163,7 +163,7 @@ impl Simulation {
     }
     /// Largest overlap at any sub-step of the last step; `None` without contact.
     pub fn largest_overlap(&self) -> Option<RelativeOverlap> {
-        self.data.dynamics.largest_overlap(&self.setup.grains, |_, _| true)
+        self.data.dynamics.largest_overlap(&self.setup.grains, |_| true)
     }
     /// Contact sub-steps of the last step; of a step repeated with the response of the fluid, those
     /// of the repetition.

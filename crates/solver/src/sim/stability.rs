@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use super::failure::{Remedy, StepError};
-use crate::dem::{MotionConstraint, Partner};
+use crate::dem::{MotionConstraint, RelativeOverlap};
 use crate::immersed::OpenSides;
 
 /// CFL number above which a step counts as unstable.
@@ -33,7 +33,7 @@ impl Simulation {
         let grains = &self.setup.grains;
         let is_free = |grain: usize| grains[grain].translation == MotionConstraint::Free;
         let counts =
-            |grain: usize, partner: Partner| is_free(grain) || partner.grain().is_some_and(is_free);
+            |it: &RelativeOverlap| is_free(it.grain) || it.partner.grain().is_some_and(is_free);
         let overlap = self.data.dynamics.largest_overlap(grains, counts);
         if let Some(overlap) = overlap.filter(|it| it.relative > self.setup.contact.overlap_limit) {
             let (what, remedy) = self.describe_overlap(overlap);

@@ -4,12 +4,13 @@
 //!
 //! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`. It needs a
 //! variant of [`ContactLawKind`], of which the compiler then names every `match` (in `crates/run`
-//! some code compares with `Linear` alone), its keys in the case file, and its name in `law_schema`
-//! there (`crates/run/src/case/raw/physics.rs`). A cohesive
-//! law overrides `ContactLaw::normal_force` and returns the pull from there: the elastic force that
-//! this function gets is at least zero. A force across a gap belongs beside the lubrication in
-//! `model.rs`: `ContactModel::range` makes pairs of this gap contacts, and `substeps.rs` chooses
-//! the sub-steps.
+//! some code compares with `Linear` alone). It also needs its keys in the case file, and its name
+//! in `law_schema` (`crates/run/src/case/raw/physics.rs`).
+//!
+//! A cohesive law overrides `ContactLaw::normal_force`, which returns the pull as a negative force;
+//! the elastic force that it gets is at least zero. A force across a gap belongs beside the
+//! lubrication in `model.rs`: `ContactModel::range` makes pairs of this gap contacts, and
+//! `substeps.rs` chooses the sub-steps.
 
 mod hertz_mindlin;
 mod law;

@@ -71,20 +71,20 @@ impl ContactDynamics {
         &self.contacts
     }
     /// Largest overlap at any sub-step of the last step, relative to the smaller equal-volume
-    /// diameter of the pair, among the pairs of a grain and its partner that `counts` accepts.
-    /// `None` without contact, and after [`ContactDynamics::restore`].
+    /// diameter of the pair, among the overlaps that `counts` accepts. `None` without contact, and
+    /// after [`ContactDynamics::restore`].
     pub fn largest_overlap(
         &self,
         grains: &[Grain],
-        counts: impl Fn(usize, Partner) -> bool,
+        counts: impl Fn(&RelativeOverlap) -> bool,
     ) -> Option<RelativeOverlap> {
-        let pair = |record: &ContactRecord| (record.key.grain as usize, record.key.partner);
         let deep = self.records.iter().filter(|record| record.deepest_overlap > 0.0);
-        let overlaps = deep.filter(|record| counts(pair(record).0, pair(record).1)).map(|record| {
-            let (grain, partner) = pair(record);
-            RelativeOverlap::of(grains, grain, partner, record.deepest_overlap)
+        let overlaps = deep.map(|ContactRecord { key, deepest_overlap, .. }| {
+            RelativeOverlap::of(grains, key.grain as usize, key.partner, *deepest_overlap)
         });
-        overlaps.reduce(|most, other| if other.relative > most.relative { other } else { most })
+        overlaps
+            .filter(counts)
+            .reduce(|most, other| if other.relative > most.relative { other } else { most })
     }
     /// Number of sub-steps of the last step; of a step repeated with the response of the fluid,
     /// those of the repetition.

@@ -195,7 +195,7 @@ fn vertex(
 }
 
 impl PartnerField<'_> {
-    /// Whether the partner is an exact sphere.
+    /// Returns whether the partner is an exact sphere.
     pub fn is_sphere(&self) -> bool {
         matches!(self, PartnerField::Shape { shape, .. } if is_sphere(shape))
     }
