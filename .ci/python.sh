@@ -51,6 +51,6 @@ cargo build --release --quiet
   "$root"/docs/notebooks/*.ipynb)
 
 # 4. Statistics of the study by a second route.
-"$work/full/bin/pip" install -q lifelines statsmodels
+"$work/full/bin/pip" install -q lifelines
 "$work/full/bin/python" studies/second_route.py results/dkt-morphology-ensemble orientation cells
 echo "python: all checks passed in $((SECONDS - started)) s"

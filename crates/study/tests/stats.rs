@@ -2,9 +2,9 @@
 
 use grainwake_study::statistics::{
     coefficient_of_variation, false_discovery_adjusted, median, quantile, ranks,
-    relative_spread_test, signed_rank, spearman,
+    relative_spread_test, sign_flip_p, signed_rank, spearman,
 };
-use grainwake_study::survival::{Duration, kaplan_meier, log_rank, median_time};
+use grainwake_study::survival::{Duration, kaplan_meier, log_rank, log_rank_excess, median_time};
 
 #[test]
 fn ties_share_their_mean_rank() {
@@ -145,19 +145,49 @@ fn kaplan_and_meier_of_a_known_sample() {
 }
 
 #[test]
-fn log_rank_of_a_known_sample() {
-    // Chi-squared 16.79 with one degree of freedom.
-    let p = log_rank(&[relapses()]).unwrap();
-    assert!((p - 4.17e-5).abs() < 0.02e-5, "{p}");
+fn log_rank_excess_of_a_known_sample() {
+    // Nine relapses under treatment, where 19.25 are expected (Freireich et al. 1963).
+    let found = log_rank_excess(&relapses());
+    assert!((found - (9.0 - 19.2505)).abs() < 1e-4, "{found}");
     let [treated, placebo] = relapses();
-    let reversed = log_rank(&[[placebo.clone(), treated.clone()]]).unwrap();
-    assert!((reversed / p - 1.0).abs() < 1e-9);
-    // A stratum without a second sample adds nothing.
-    let strata = [relapses(), [treated.clone(), Vec::new()]];
-    assert!((log_rank(&strata).unwrap() / p - 1.0).abs() < 1e-9);
-    assert!(log_rank(&[[treated, Vec::new()]]).is_none());
-    // Equal samples do not differ.
-    assert!((log_rank(&[[placebo.clone(), placebo]]).unwrap() - 1.0).abs() < 1e-9);
+    let reversed = log_rank_excess(&[placebo.clone(), treated.clone()]);
+    assert!((reversed + found).abs() < 1e-12);
+    assert_eq!(log_rank_excess(&[treated, Vec::new()]), 0.0, "nothing to compare");
+    assert!(log_rank_excess(&[placebo.clone(), placebo]).abs() < 1e-12, "equal samples");
+}
+
+#[test]
+fn log_rank_p_counts_strata_and_not_their_members() {
+    // Six strata, the first sample later in all of them: 2 of 2^6 combinations are as far.
+    let stratum = |members: usize| {
+        let sample = |time| vec![Duration { time, censored: false }; members];
+        [sample(2.0), sample(1.0)]
+    };
+    let p = |strata: usize, members: usize| log_rank(&vec![stratum(members); strata]);
+    for members in [1, 8] {
+        assert_eq!(p(6, members), Some(2.0 / 64.0));
+        assert_eq!(p(5, members), None);
+        assert_eq!(p(16, members), Some(2.0 / 65536.0));
+    }
+}
+
+#[test]
+fn sign_flips_of_known_values() {
+    // Of the sums of 1 to 6 with any signs 21, 19 and 17 are as large, and as many as small.
+    let p = sign_flip_p(&[1.0, -2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+    assert_eq!(p, 6.0 / 64.0);
+    // Values of zero do not matter; rounding does not decide.
+    assert_eq!(sign_flip_p(&[0.1, -0.2, 0.3, 0.4, 0.5, 0.6, 0.0]), Some(p));
+    assert_eq!(sign_flip_p(&[0.0; 6]), Some(1.0));
+    assert_eq!(sign_flip_p(&[0.0; 21]), Some(1.0));
+    // Values of one size: a binomial distribution. Beyond 20 values combinations are drawn.
+    let signs = |count: usize, negative: usize| {
+        let mut values = vec![1.0; count];
+        values[..negative].fill(-1.0);
+        sign_flip_p(&values).unwrap()
+    };
+    assert!((signs(20, 5) - 0.041389).abs() < 1e-6, "{}", signs(20, 5));
+    assert!((signs(21, 6) - 0.078354).abs() < 0.003, "{}", signs(21, 6));
 }
 
 #[test]

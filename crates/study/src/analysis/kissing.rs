@@ -67,7 +67,8 @@ pub struct LevelDifference {
     pub share: f64,
     /// Interval of the difference of the shares.
     pub interval: [f64; 2],
-    /// Two-sided p value of the log-rank test of the times, stratified by the other axes.
+    /// Two-sided p value of the log-rank test of the times, stratified by the other axes, the
+    /// members of a model counting as one; none below six pairs.
     pub log_rank_p: Option<f64>,
     /// Hodges-Lehmann shift of the median times of models that kiss at both levels.
     pub time_shift: Option<f64>,

@@ -74,7 +74,8 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
         return None;
     }
     let r = pearson(&ranks(x), &ranks(y))?;
-    let half_width = normal_quantile(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
+    let half_width =
+        Normal::standard().inverse_cdf(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
     // A perfect correlation has no finite z; the next smaller possible value replaces it.
     let steps = (n * (n * n - 1)) as f64;
     let z = r.clamp(-1.0 + 6.0 / steps, 1.0 - 6.0 / steps).atanh();
@@ -134,6 +135,30 @@ pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
         high: averages[averages.len() - 1 - cut],
         p: (2.0 * lower.min(upper)).min(1.0),
     })
+}
+
+/// Returns the two-sided p value of the sum of values whose signs are random: the share of the
+/// combinations of signs for which the sum is as far from zero. None below six values.
+///
+/// It counts all combinations up to 20 values, and draws 100000 of them beyond.
+pub fn sign_flip_p(values: &[f64]) -> Option<f64> {
+    if values.len() < 6 {
+        return None;
+    }
+    // Sums that differ by rounding only are equal.
+    let size: f64 = values.iter().map(|v| v.abs()).sum();
+    let least = values.iter().sum::<f64>().abs() - EQUAL * size;
+    let as_far = |sums: &[f64]| sums.iter().filter(|sum| sum.abs() >= least).count() as f64;
+    if values.len() <= 20 {
+        let add = |sums: Vec<f64>, v: &f64| sums.iter().flat_map(|s| [s + v, s - v]).collect();
+        let sums = values.iter().fold(vec![0.0], add);
+        return Some(as_far(&sums) / sums.len() as f64);
+    }
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
+    let mut sum = || values.iter().map(|v| if random.random() { *v } else { -v }).sum();
+    let sums: Vec<f64> = (0..100_000).map(|_| sum()).collect();
+    // The observed combination is one of them.
+    Some((as_far(&sums) + 1.0) / (sums.len() as f64 + 1.0))
 }
 
 /// Counts the sign combinations with each sum of positive ranks, indexed by twice the sum.
@@ -249,8 +274,4 @@ pub fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / n;
     let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     (values.len() > 1 && mean != 0.0).then(|| (square / (n - 1.0)).sqrt() / mean.abs())
-}
-
-fn normal_quantile(p: f64) -> f64 {
-    Normal::new(0.0, 1.0).map_or(1.96, |normal| normal.inverse_cdf(p))
 }

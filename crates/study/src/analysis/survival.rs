@@ -1,6 +1,6 @@
 //! Right-censored times: Kaplan and Meier's estimate of the distribution, and the log-rank test.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use super::statistics::sign_flip_p;
 
 /// A time until an event, or until the observation ended without it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,23 +31,24 @@ pub fn median_time(durations: &[Duration]) -> Option<f64> {
 
 /// Performs the log-rank test of two samples, stratified: each stratum is a pair of samples.
 ///
-/// Returns the two-sided p value; none if no stratum has an event while both samples are at risk.
+/// The durations of a stratum may depend on each other. The two-sided p value is that of the sum of
+/// [`log_rank_excess`] if exchanging the samples of a stratum is as likely as not
+/// ([`sign_flip_p`]); none below six strata.
 pub fn log_rank(strata: &[[Vec<Duration>; 2]]) -> Option<f64> {
-    let (mut excess, mut variance) = (0.0, 0.0);
-    for [first, second] in strata {
-        let all: Vec<Duration> = first.iter().chain(second).copied().collect();
-        for (time, [events, at_risk]) in events(&all) {
-            let own = first.iter().filter(|d| d.time >= time).count() as f64;
-            let observed = first.iter().filter(|d| d.time == time && !d.censored).count() as f64;
-            let part = own / at_risk;
-            excess += observed - events * part;
-            if at_risk > 1.0 {
-                variance += events * part * (1.0 - part) * (at_risk - events) / (at_risk - 1.0);
-            }
-        }
-    }
-    let distribution = ChiSquared::new(1.0).ok()?;
-    (variance > 0.0).then(|| distribution.sf(excess * excess / variance))
+    let excesses: Vec<f64> = strata.iter().map(log_rank_excess).collect();
+    sign_flip_p(&excesses)
+}
+
+/// Returns the number of events in the first sample less the number that the log-rank test expects
+/// there if both samples have the same distribution.
+pub fn log_rank_excess([first, second]: &[Vec<Duration>; 2]) -> f64 {
+    let all: Vec<Duration> = first.iter().chain(second).copied().collect();
+    let excess_at = |(time, [events, at_risk]): (f64, [f64; 2])| {
+        let own = first.iter().filter(|d| d.time >= time).count() as f64;
+        let observed = first.iter().filter(|d| d.time == time && !d.censored).count() as f64;
+        observed - events * own / at_risk
+    };
+    events(&all).into_iter().map(excess_at).sum()
 }
 
 /// Returns the distinct times of events, ascending, each with the numbers of events and of those

@@ -66,8 +66,8 @@ fn differences(differences: &[LevelDifference], gridded: bool) -> Markup {
     html! {
         p {
             "Differences over the models that are equal on all other axes. The log-rank test of \
-             the times is stratified by these axes and includes pairs that land first. The \
-             difference of the times is the Hodges-Lehmann shift of the median times of models \
+             the times is stratified by these axes and includes pairs that land first; its p value \
+             counts the members of a model as one. The difference of the times is the Hodges-Lehmann shift of the median times of models \
              that kiss at both levels."
         }
         (table(&columns, differences.iter().map(row)))
