@@ -92,7 +92,7 @@ pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
             return Err(FormatError::line(file, 1, what));
         }
     };
-    let (rows, time, rows_before) = rows_at(file, table.column("time"), table.rows(), at)?;
+    let Rows { rows, time, before } = rows_at(file, table.column("time"), table.rows(), at)?;
     let mut seen = BTreeSet::new();
     let mut poses = Vec::with_capacity(rows.len());
     for row in rows {
@@ -141,24 +141,31 @@ pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
         });
     }
     poses.sort_by_key(|pose| pose.grain);
-    Ok(Poses { time, poses, rows_before })
+    Ok(Poses { time, poses, rows_before: before })
 }
 
-/// Returns the rows at the wanted time, this time, and the number of rows at the time before.
-#[expect(clippy::type_complexity, reason = "the parts have no meaning together elsewhere")]
+/// Rows of a table at one time.
+struct Rows {
+    rows: Vec<usize>,
+    time: Option<f64>,
+    /// Number of rows at the time before.
+    before: Option<usize>,
+}
+
+/// Returns the rows at the wanted time.
 fn rows_at(
     file: &Path,
     times: Option<&[f64]>,
     count: usize,
     at: Option<f64>,
-) -> Result<(Vec<usize>, Option<f64>, Option<usize>), FormatError> {
+) -> Result<Rows, FormatError> {
     if count == 0 {
         return Err(FormatError::line(file, 1, "the table has no rows"));
     }
     let Some(times) = times else {
         return match at {
             Some(_) => Err(FormatError::line(file, 1, "the table has no column 'time'")),
-            None => Ok(((0..count).collect(), None, None)),
+            None => Ok(Rows { rows: (0..count).collect(), time: None, before: None }),
         };
     };
     if let Some(row) = times.iter().position(|time| !time.is_finite()) {
@@ -175,8 +182,8 @@ fn rows_at(
     };
     let at_time = |wanted: f64| (0..count).filter(move |row| times[*row] == wanted);
     let before = last_before(&|earlier| earlier < time);
-    let rows_before = before.map(|earlier| at_time(earlier).count());
-    Ok((at_time(time).collect(), Some(time), rows_before))
+    let before = before.map(|earlier| at_time(earlier).count());
+    Ok(Rows { rows: at_time(time).collect(), time: Some(time), before })
 }
 
 #[cfg(test)]

@@ -4,9 +4,6 @@
 //! Layers, downwards: `simulation`, `study`, `validation` -> `case` -> `running`, `case_dict` ->
 //! `grain`, `results` -> `arguments`, `arrays`, `threads` -> `error`.
 
-// PyO3 takes the doc comments as docstrings in the NumPy style.
-#![allow(rustdoc::all, clippy::doc_markdown)]
-
 mod arguments;
 mod arrays;
 mod case;

@@ -5,7 +5,7 @@
 mod peak_memory;
 #[path = "common/renewed.rs"]
 mod renewed;
-#[path = "common/tiled.rs"]
+#[path = "shape/tiled.rs"]
 mod tiled;
 
 use grainwake_shape::mesh::read_mesh;

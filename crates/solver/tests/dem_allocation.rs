@@ -1,11 +1,12 @@
 //! No allocation in a sub-step once the buffers have grown.
 
-mod dem_support;
+#[path = "dem/clouds.rs"]
+mod clouds;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use dem_support::{cloud, step};
+use clouds::{cloud, step, weights};
 use glam::DVec3;
 use grainwake_solver::dem::{
     ContactDynamics, ContactParams, Enclosure, Grain, GrainResponse, RigidState, Side,
@@ -54,7 +55,7 @@ fn a_heap_at_rest_steps_without_allocating() {
     for _ in 0..800 {
         step(&mut dynamics, &mut grains, gravity, 1e-3);
     }
-    let loads = dem_support::weights(&grains, gravity);
+    let loads = weights(&grains, gravity);
     let mut mean = vec![Load::default(); grains.len()];
     let before = COUNT.load(Ordering::Relaxed);
     let mut substeps = 0;

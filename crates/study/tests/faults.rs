@@ -1,14 +1,15 @@
 //! Faults of the disk at random changes of a study: after any of them the study resumes to the bits
 //! of an undisturbed one. `FAULT_CASES` sets the number of cases and `FAULT_SEED` their choice.
 
-mod common;
+#[path = "study/files.rs"]
+mod files;
 #[path = "../../run/tests/common/folders.rs"]
 mod folders;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{DRY, STUDY};
+use files::{DRY, STUDY};
 use folders::{contents, copy, folder_in_memory, setting};
 use grainwake_formats::disk::faults::{Fault, inject};
 use grainwake_run::FailureKind;

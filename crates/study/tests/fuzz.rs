@@ -1,9 +1,10 @@
 //! Study and analysis files against damage: located refusals or a result, never a panic.
 //! `PROPTEST_CASES` sets the number of cases.
 
-mod common;
+#[path = "study/files.rs"]
+mod files;
 
-use common::{DRY, STUDY};
+use files::{DRY, STUDY};
 use grainwake_study::{Analysis, Plan, Study};
 use proptest::prelude::*;
 use proptest::sample::Index;

@@ -4,8 +4,12 @@ use std::path::{Path, PathBuf};
 
 use grainwake_validation::{DrawnFigure, Suite, SuiteError};
 
-#[path = "../../report/tests/synthetic/mod.rs"]
-mod synthetic;
+#[path = "../../report/tests/report/synthetic/flows.rs"]
+mod flows;
+#[path = "../../report/tests/report/synthetic/fresh.rs"]
+mod fresh;
+#[path = "../../report/tests/report/synthetic/writing.rs"]
+mod writing;
 
 const SUITE: &str = r##"
 title = "Made up"
@@ -98,7 +102,7 @@ to = [1, 1]
 
 /// Returns a suite with this text, and an empty folder for its runs.
 fn suite(text: &str) -> (PathBuf, Result<Suite, SuiteError>) {
-    let folder = synthetic::folder("suite");
+    let folder = fresh::folder("suite");
     std::fs::write(folder.join("case.toml"), "").unwrap();
     std::fs::write(folder.join("speed.csv"), "t,part\n0.1,0.4\n0.5,0.75\n1.2,0.78\n").unwrap();
     std::fs::write(folder.join("validation.toml"), text).unwrap();
@@ -119,8 +123,8 @@ fn fill(runs: &Path) {
     for name in ["sphere", "cavity"] {
         std::fs::create_dir_all(runs.join(name)).unwrap();
     }
-    synthetic::single(&runs.join("sphere"));
-    synthetic::cavity(&runs.join("cavity"));
+    flows::single(&runs.join("sphere"));
+    flows::cavity(&runs.join("cavity"));
     // Second order between the two finest runs, not from the coarsest.
     ends_at(&runs.join("coarse"), 2.5);
     ends_at(&runs.join("middle"), 1.92);

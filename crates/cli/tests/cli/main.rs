@@ -1,0 +1,25 @@
+//! Tests of the program as its user runs it.
+
+mod bad_grain;
+mod bad_input;
+mod branch;
+mod closed_pipes;
+mod commands;
+mod common;
+mod contacts;
+mod export;
+mod film;
+mod hollow;
+mod installed;
+mod leaving;
+mod lock;
+mod messages;
+mod outputs;
+mod overlap;
+mod poses;
+mod probes;
+mod resume;
+mod scan;
+mod study;
+mod validate;
+mod view;
