@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p grainwake-shape --example scanned_bodies -- measures
-//! cargo run --release -p grainwake-shape --example scanned_bodies -- roundness voxels=40,80 noise=0,5
+//! cargo run --release -p grainwake-shape --example scanned_bodies -- roundness noise=0,5
 //! ```
 //!
 //! `measures` goes over the voxels across the inscribed sphere. `roundness` takes settings, which
