@@ -23,10 +23,8 @@ impl Watch {
     pub fn new(sim: &Simulation, stop: Option<Stop>) -> Watch {
         let setup = sim.setup();
         let enclosure = setup.enclosure();
-        let period =
-            [0, 1, 2].map(|axis| enclosure.is_periodic(axis).then(|| enclosure.size()[axis]));
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
-        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, period);
+        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, enclosure);
         let tracker = Tracker::new(params, sim.grains(), pair_gap(sim, &enclosure));
         Watch { enclosure, tracker, stop, separation_hold: params.separation_hold }
     }

@@ -83,7 +83,8 @@ fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     let sideways = velocity.truncate().length() / velocity.z.abs();
     assert!(sideways < 0.01, "{sideways}");
     // The grain leaves within a few steps after it is beyond the plane, and is gone for good.
-    let params = EventParams::for_grains(short.grains(), DVec3::NEG_Z, 1.0, [None; 3]);
+    let params =
+        EventParams::for_grains(short.grains(), DVec3::NEG_Z, 1.0, short.setup().enclosure());
     let mut tracker = Tracker::new(params, short.grains(), None);
     for _ in 0..200 {
         step(&mut short);

@@ -82,7 +82,7 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
 pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
     let (g, density) = (setup.gravity.length(), setup.fluid.map_or(0.0, |fluid| fluid.density));
     let EventParams { down, floor: (axis, side), .. } =
-        EventParams::for_grains(&setup.grains, setup.gravity, density, [None; 3]);
+        EventParams::for_grains(&setup.grains, setup.gravity, density, setup.enclosure());
     let (axis, side) = (axis as usize, side as usize);
     if !matches!(setup.boundaries.0[axis][side], Boundary::Wall { .. } | Boundary::Slip) {
         return None;

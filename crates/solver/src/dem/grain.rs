@@ -135,24 +135,3 @@ impl Grain {
             + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }
-
-/// Position and velocities of a grain at the start of a step; prescribed velocities are those of
-/// the step.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct GrainKinematics {
-    /// Centroid [m].
-    pub position: DVec3,
-    /// Velocities.
-    pub velocity: RigidVelocity,
-}
-
-impl GrainKinematics {
-    /// Present kinematics of a grain.
-    pub fn of(grain: &Grain) -> GrainKinematics {
-        GrainKinematics { position: grain.pose.position, velocity: grain.rigid_velocity() }
-    }
-    /// Velocity [m/s] of the grain's material point at `x` [m].
-    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
-        self.velocity.at(x - self.position)
-    }
-}

@@ -20,7 +20,6 @@ mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner, Side};
-pub(crate) use grain::GrainKinematics;
 pub use grain::{Grain, Material, MotionConstraint};
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,

@@ -34,7 +34,7 @@ use super::geometry::{FaceRow, LocatedBody};
 use super::links::{
     BoxVelocity, LinkPlanes, NO_LINK, RigidLinks, compute_link_weights, listed_faces,
 };
-use crate::dem::GrainKinematics;
+use crate::dem::RigidState;
 use crate::flow::{OldState, Prediction};
 use crate::grid::Mesh;
 use crate::math::Real;
@@ -60,7 +60,7 @@ pub fn find_correction<R: Real>(
     eps: f64,
     kinematic_viscosity: f64,
     known: &OldState<R>,
-    kinematics: &GrainKinematics,
+    kinematics: &RigidState,
     body: &LocatedBody,
     scratch: &mut AdvectionScratch<R>,
     correction: &mut AdvectionCorrection,
@@ -160,7 +160,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
     fn new(
         [eps, nu]: [f64; 2],
         mesh: &Mesh,
-        kinematics: &GrainKinematics,
+        kinematics: &RigidState,
         body: &'a LocatedBody,
         velocity: &'a BoxVelocity<'a, R>,
         component: usize,

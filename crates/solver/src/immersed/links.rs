@@ -13,7 +13,7 @@ use glam::{DVec3, IVec3};
 
 use super::geometry::aperture::{forcing_reach, inverse_aperture_excess};
 use super::geometry::{LocatedBody, PAD};
-use crate::dem::GrainKinematics;
+use crate::dem::RigidState;
 use crate::flow::OldState;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::{Aligned, Real};
@@ -175,7 +175,7 @@ pub struct RigidLinks {
 impl RigidLinks {
     pub fn new(
         mesh: &Mesh,
-        kinematics: &GrainKinematics,
+        kinematics: &RigidState,
         lowest: IVec3,
         component: usize,
     ) -> RigidLinks {

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::*;
-use crate::dem::{Grain, GrainKinematics};
+use crate::dem::{Grain, RigidState};
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams, NestedFlow};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
@@ -46,7 +46,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     let previous = grains
         .each_ref()
         .map(|grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() });
-    let kinematics = grains.each_ref().map(GrainKinematics::of);
+    let kinematics = grains.each_ref().map(RigidState::of);
     flow.predict(DT);
     for grain in &mut grains {
         grain.pose.position += DT * grain.velocity;
@@ -159,7 +159,7 @@ fn padding_of_rows_affects_no_link() {
             &mut flow,
             CouplingInput {
                 grains: &grains,
-                kinematics: &grains.each_ref().map(GrainKinematics::of),
+                kinematics: &grains.each_ref().map(RigidState::of),
                 previous: &[PreviousStep::default(); 2],
                 contact: &[impact(), Load::default()],
                 applied: &[Load::default(); 2],
@@ -204,7 +204,7 @@ fn isolated_and_conflicting(
     let grains: Vec<Grain> = (0..count).map(|n| grain(at(n))).collect();
     let mut immersed = ImmersedGrains::new(&flow, scheme, 1.0, 0.01, &grains);
     flow.predict(DT);
-    let kinematics: Vec<_> = grains.iter().map(GrainKinematics::of).collect();
+    let kinematics: Vec<_> = grains.iter().map(RigidState::of).collect();
     let (previous, none) = (vec![PreviousStep::default(); count], vec![Load::default(); count]);
     let input = || CouplingInput {
         grains: &grains,

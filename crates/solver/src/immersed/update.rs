@@ -11,7 +11,7 @@ use super::open_sides::Crossing;
 use super::rigid_body::{PreviousStep, RigidBodySystem};
 use super::rigidity::{add_rigid_gain, sum_impulse};
 use super::shared_faces::share_faces;
-use crate::dem::{Grain, GrainKinematics};
+use crate::dem::{Grain, RigidState};
 use crate::flow::{OldState, Prediction};
 use crate::math::{Load, Pose, Real, RigidVelocity};
 
@@ -86,7 +86,7 @@ pub struct CouplingInput<'a> {
     /// Grains at their new poses.
     pub grains: &'a [Grain],
     /// Kinematics when the flow was predicted.
-    pub kinematics: &'a [GrainKinematics],
+    pub kinematics: &'a [RigidState],
     /// State carried over from the previous step.
     pub previous: &'a [PreviousStep],
     /// Mean contact loads in the sub-steps so far.

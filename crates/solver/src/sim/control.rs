@@ -151,11 +151,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// External loads, one per grain: force [N] and torque about the centroid [N m], space frame.
-    pub fn external_loads(&self) -> &[Load] {
-        &self.data.external
-    }
-
     fn check_control(
         &self,
         grain: usize,

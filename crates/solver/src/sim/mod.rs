@@ -24,8 +24,7 @@ mod timing;
 use glam::DVec3;
 
 use crate::dem::{
-    Contact, ContactDynamics, ContactParams, Grain, GrainKinematics, GrainResponse,
-    RelativeOverlap, RigidState,
+    Contact, ContactDynamics, ContactParams, Grain, GrainResponse, RelativeOverlap, RigidState,
 };
 use crate::grid::Mesh;
 use crate::immersed::{OpenSides, PreviousStep};
@@ -69,7 +68,8 @@ struct StepData {
     /// Mean hydrodynamic loads over the last step; zero without fluid.
     loads: Vec<Load>,
     previous: Vec<PreviousStep>,
-    kinematics: Vec<GrainKinematics>,
+    /// At the start of the step; prescribed velocities are those of the step.
+    kinematics: Vec<RigidState>,
     /// Loads set between steps.
     external: Vec<Load>,
     /// Weight less buoyancy, and external load.
@@ -98,7 +98,7 @@ impl StepData {
             momentum_residual: DVec3::ZERO,
             loads: vec![Load::default(); count],
             previous: vec![PreviousStep::default(); count],
-            kinematics: vec![GrainKinematics::default(); count],
+            kinematics: grains.iter().map(RigidState::of).collect(),
             external: vec![Load::default(); count],
             applied: vec![Load::default(); count],
             driving: vec![Load::default(); count],

@@ -5,9 +5,7 @@ use glam::DVec3;
 
 use super::fluid::Fluid;
 use super::{Setup, Simulation, StepData};
-use crate::dem::{
-    ContactDynamics, Grain, GrainKinematics, MotionConstraint, RigidState, TrialStep,
-};
+use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
     CoupledGrains, CouplingInput, Crossing, PreviousStep, RigidityInput, Scheme,
 };
@@ -93,7 +91,7 @@ impl<'a> Start<'a> {
             return Start::Dry(GrainContext { setup, data, time, dt });
         };
         for (kinematics, grain) in data.kinematics.iter_mut().zip(&setup.grains) {
-            *kinematics = GrainKinematics::of(grain);
+            *kinematics = RigidState::of(grain);
         }
         if let Some(acceleration) = setup.prescription.body_acceleration(time) {
             fluid.set_body_acceleration(acceleration);

@@ -295,6 +295,11 @@ impl RigidState {
         RigidState { pose: grain.pose, velocity: grain.rigid_velocity() }
     }
 
+    /// Velocity [m/s] of the grain's material point at `x` [m].
+    pub fn velocity_at(&self, x: DVec3) -> DVec3 {
+        self.velocity.at(x - self.pose.position)
+    }
+
     /// Gives a grain this state.
     pub fn apply_to(&self, grain: &mut Grain) {
         grain.pose = self.pose;

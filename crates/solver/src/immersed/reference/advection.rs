@@ -6,7 +6,7 @@
 use glam::IVec3;
 
 use super::Reference;
-use crate::dem::GrainKinematics;
+use crate::dem::RigidState;
 use crate::flow::OldState;
 use crate::immersed::advection::LARGEST_EXCESS;
 use crate::immersed::geometry::aperture::forcing_reach;
@@ -19,7 +19,7 @@ impl Reference {
         &self,
         index: usize,
         known: &OldState<f64>,
-        kinematics: &GrainKinematics,
+        kinematics: &RigidState,
         component: usize,
         face: IVec3,
     ) -> f64 {
@@ -57,7 +57,7 @@ impl Reference {
         &self,
         index: usize,
         known: &OldState<f64>,
-        kinematics: &GrainKinematics,
+        kinematics: &RigidState,
         component: usize,
         axis: usize,
         lower: IVec3,

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3, IVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::Reference;
-use crate::dem::{Grain, GrainKinematics};
+use crate::dem::{Grain, RigidState};
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams};
 use crate::grid::Mesh;
 use crate::immersed::Scheme;
@@ -279,7 +279,7 @@ fn the_advection_correction_matches_the_reference() {
     for (nu, largest) in [NU, 1e-4].into_iter().zip(&mut largest) {
         case.reference.kinematic_viscosity = nu;
         for index in SPHERES {
-            let kinematics = GrainKinematics::of(&case.reference.grains[index]);
+            let kinematics = RigidState::of(&case.reference.grains[index]);
             let (known, _) = case.flow.prediction();
             let (mut scratch, mut correction) = Default::default();
             let body = &case.located[index].0;

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use grainwake_formats::events::{Event, EventKind};
 
-use crate::dem::{Grain, MotionConstraint};
+use crate::dem::{Enclosure, Grain, MotionConstraint};
 
 pub use tracker::{Tracker, TrackerState};
 
@@ -65,8 +65,8 @@ pub struct EventParams {
     pub down: DVec3,
     /// Face of the box on which grains land: axis and side.
     pub floor: (u8, u8),
-    /// Period of the box along periodic axes [m].
-    pub period: [Option<f64>; 3],
+    /// Box, for the nearest images along periodic axes.
+    pub enclosure: Enclosure,
     /// Smallest gap of a separated pair [m].
     pub separation_gap: f64,
     /// Time without contact after which a pair counts as separated [s].
@@ -86,7 +86,7 @@ impl EventParams {
         grains: &[Grain],
         gravity: DVec3,
         fluid_density: f64,
-        period: [Option<f64>; 3],
+        enclosure: Enclosure,
     ) -> EventParams {
         let mut free =
             grains.iter().filter(|grain| grain.translation == MotionConstraint::Free).peekable();
@@ -102,7 +102,7 @@ impl EventParams {
         EventParams {
             down,
             floor: (axis as u8, u8::from(down[axis] > 0.0)),
-            period,
+            enclosure,
             separation_gap: 0.05 * d,
             separation_hold: if g > 0.0 { (d / g).sqrt() } else { 0.0 },
             tumble_angle: std::f64::consts::FRAC_PI_4,

@@ -124,13 +124,7 @@ impl Pair {
 impl EventParams {
     /// Vector from the centroid of `a` to that of the nearest image of `b` [m].
     pub(super) fn line_of_centres(&self, a: &Grain, b: &Grain) -> DVec3 {
-        let mut line = b.pose.position - a.pose.position;
-        for (axis, period) in self.period.iter().enumerate() {
-            if let Some(period) = period {
-                line[axis] -= period * (line[axis] / period).round();
-            }
-        }
-        line
+        self.enclosure.nearest_image(b.pose.position - a.pose.position)
     }
 
     /// Angle between the line of centres and the vertical [rad].

@@ -140,10 +140,6 @@ impl Tracker {
         let complete = self.first(EventKind::Left).is_none();
         self.state.pair.as_ref().filter(|_| complete).map(|p| p.gap)
     }
-    /// Index of the lower grain of a pair.
-    pub fn leader(&self) -> Option<usize> {
-        self.state.pair.as_ref().map(|p| p.leader)
-    }
     /// Time of the first contact of the pair [s].
     pub fn kiss_time(&self) -> Option<f64> {
         self.first(EventKind::Kiss)
