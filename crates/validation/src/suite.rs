@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
-use grainwake_run::case::{Located, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source, did_you_mean};
 use serde::Deserialize;
 
 use crate::check::{Bounds, Check, Level, Reference, SuiteRun};
@@ -313,7 +313,7 @@ fn check_references(suite: &Suite) -> Result<(), Problem> {
             let mut known = earlier.iter().filter(|r| r.name == *other);
             if !known.any(|r| r.checks.iter().any(|c| c.quantity == check.quantity)) {
                 let names = earlier.iter().map(|r| r.name.as_str());
-                let hint = problem::did_you_mean(other, names);
+                let hint = did_you_mean(other, names);
                 let message = format!(
                     "{}: run \"{}\" compares \"{}\" with that of \"{other}\", which has none",
                     suite.name, run.name, check.quantity

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use grainwake_plot::style;
-use grainwake_run::case::{Located, Problem, Source};
+use grainwake_run::case::{Located, Problem, Source, did_you_mean};
 
 use super::raw::{AxisSpec, SliceSpec};
 use super::raw::{
@@ -259,7 +259,7 @@ impl Context<'_> {
         let found = self.runs.iter().find(|run| run.name == name.value);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.runs.iter().map(|run| run.name.as_str()).collect();
-            let hint = problem::did_you_mean(name, names.iter().copied());
+            let hint = did_you_mean(name, names.iter().copied());
             let message = format!("there is no run \"{}\"", name.value);
             let help = format!("{hint}Known runs: {}", names.join(", "));
             self.at(name, message, help, "not a run of this suite")
