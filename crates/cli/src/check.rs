@@ -86,6 +86,9 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     let free =
         e.memory_free_bytes.map_or(String::new(), |free| format!(" ({} are free)", size(free)));
     rows.push(("memory", format!("{}{free}", size(e.memory_bytes))));
+    let checkpoints = size(e.checkpoint_bytes);
+    let disk = format!("{}, and {checkpoints} of checkpoints", size(e.disk_bytes));
+    rows.push(("disk space", disk));
     let (wall, threads) = (clock(e.wall_s), count(threads, "thread"));
     rows.push(("wall time", format!("about {wall} on {threads}")));
     let mut lines = vec![columns(&rows)];

@@ -219,16 +219,17 @@ fn dry_run(
         0 => "no run is finished; runs that stop at rest or separation count to their end".into(),
         n => format!("from {}", count(n, "finished run")),
     };
-    let disk = cost
-        .disk_bytes
-        .map_or(String::new(), |bytes| format!(", {} of disk space", size(bytes as u64)));
-    let largest = to_do.iter().map(|run| run.memory_bytes).max().unwrap_or(0);
+    let at_once =
+        |bytes: fn(&&&Run) -> u64| jobs as u64 * to_do.iter().map(|r| bytes(&r)).max().unwrap_or(0);
     lines.push(format!(
-        "{} of {} to do: about {time} with {jobs} at once, {} each ({basis}); {} of memory{disk}",
+        "{} of {} to do: about {time} with {jobs} at once, {} each ({basis}); {} of memory, {} of \
+         disk space and {} of checkpoints",
         to_do.len(),
         states.len(),
         count(threads, "thread"),
-        size(jobs as u64 * largest),
+        size(at_once(|run| run.memory_bytes)),
+        size(cost.disk_bytes as u64),
+        size(at_once(|run| run.checkpoint_bytes)),
     ));
     Ok(lines.join("\n"))
 }

@@ -1,9 +1,10 @@
-//! Estimates before a run: Galileo number, settling speed, steps, memory, wall-clock time.
+//! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall-clock time.
 
 use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
 use super::settling::{impact_speed, is_free, landing_time};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
+use crate::run_folder::{checkpoint_bytes, output_bytes};
 use grainwake_shape::{Field, available_memory};
 use grainwake_solver::dem::Grain;
 use grainwake_solver::sim::Setup;
@@ -44,6 +45,10 @@ pub struct Estimate {
     pub memory_bytes: u64,
     /// Free memory of this machine, if known [bytes].
     pub memory_free_bytes: Option<u64>,
+    /// Size of the run folder without checkpoints [bytes]: tables, VTK files and grain files.
+    pub disk_bytes: u64,
+    /// Size of the checkpoints during the run [bytes].
+    pub checkpoint_bytes: u64,
     /// Largest Galileo number of the grains.
     pub galileo: Option<f64>,
     /// Index of the free grain with that Galileo number.
@@ -73,8 +78,14 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Estimates a run on `threads` threads, without warnings.
-    pub(super) fn of(setup: &Setup, plan: &RunPlan, threads: usize) -> Estimate {
+    /// Estimates a run on `threads` threads with grain files of `grain_files` bytes, without
+    /// warnings.
+    pub(super) fn of(
+        setup: &Setup,
+        plan: &RunPlan,
+        threads: usize,
+        grain_files: usize,
+    ) -> Estimate {
         let g = setup.gravity.length();
         let fluid = setup.fluid.as_ref();
         let largest = fluid.and_then(|fluid| {
@@ -124,6 +135,8 @@ impl Estimate {
             time_step_s,
             memory_bytes: memory::needed(setup),
             memory_free_bytes: available_memory(),
+            disk_bytes: output_bytes(setup, plan, expected_end_s, grain_files) as u64,
+            checkpoint_bytes: checkpoint_bytes(setup, plan) as u64,
             galileo,
             galileo_grain: largest.map(|(index, ..)| index),
             reynolds,

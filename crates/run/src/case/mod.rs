@@ -139,7 +139,8 @@ impl Case {
 
     /// Estimates a run on `threads` threads, with warnings.
     pub fn estimate(&self, threads: usize) -> Estimate {
-        let mut estimate = Estimate::of(&self.setup, &self.plan, threads);
+        let grain_files = self.shapes.iter().map(|(_, bytes)| bytes.len()).sum();
+        let mut estimate = Estimate::of(&self.setup, &self.plan, threads, grain_files);
         estimate.warnings = warnings::warnings(&self.setup, &self.plan, &self.expect, &estimate);
         estimate
     }

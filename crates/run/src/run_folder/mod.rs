@@ -10,6 +10,7 @@ mod parent;
 mod probes;
 pub mod provenance;
 mod scaled;
+mod size;
 mod surfaces;
 mod tables;
 mod vtk_output;
@@ -22,5 +23,6 @@ pub(crate) use extra::ExtraTable;
 pub(crate) use folder::{
     Content, admit, admit_parent, clear, create, lock_folder, same_parent, start_lost,
 };
+pub(crate) use size::{checkpoint_bytes, output_bytes};
 pub(crate) use tables::Tables;
 pub(crate) use vtk_output::{VtkOutput, contact_files};

@@ -9,7 +9,9 @@ use grainwake_shape::Shape;
 use grainwake_solver::dem::Grain;
 
 /// Largest number of triangles in one file; finer surfaces are simplified.
-const MAX_TRIANGLES: usize = 400_000;
+pub(super) const MAX_TRIANGLES: usize = 400_000;
+/// Cubes across the diameter whose points a simplified surface merges.
+pub(super) const MERGED_CELLS: f64 = 10.0;
 
 /// Closed surface in the body frame.
 #[derive(Clone, Debug)]
@@ -36,7 +38,8 @@ impl Surfaces {
                     let (points, triangles) = grain.shape.surface_mesh();
                     let mut surface = BodySurface { points, triangles };
                     if surface.triangles.len() * grains.len() > MAX_TRIANGLES {
-                        surface = surface.simplified(grain.shape.equivalent_diameter() / 10.0);
+                        surface =
+                            surface.simplified(grain.shape.equivalent_diameter() / MERGED_CELLS);
                     }
                     let surface = Arc::new(surface);
                     known.push((key, surface.clone()));

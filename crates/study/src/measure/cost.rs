@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::mean;
 use super::record::RunRecord;
 use crate::plan::{Plan, Run};
 
@@ -14,10 +13,10 @@ const SIMILAR: f64 = 1.25;
 pub struct Cost {
     /// Wall-clock time on one thread [s].
     pub wall_s: f64,
-    /// Size of their folders [bytes]; none if no finished run has a folder.
-    pub disk_bytes: Option<f64>,
-    /// Number of finished runs from which the cost follows. If 0, the time follows from the case
-    /// files alone.
+    /// Size of their folders without checkpoints [bytes].
+    pub disk_bytes: f64,
+    /// Number of finished runs from which the cost follows. If 0, it follows from the case files
+    /// alone.
     pub basis: usize,
 }
 
@@ -30,8 +29,8 @@ struct Done<'a> {
     disk: Option<f64>,
 }
 
-/// Estimates the cost of runs. The time estimated from a case file is scaled by the ratio of
-/// measured to estimated time of the finished runs, if possible of those with a similar grid.
+/// Estimates the cost of runs. The time and size estimated from a case file are scaled by the ratio
+/// of measured to estimated values of the finished runs, if possible of those with a similar grid.
 pub fn expected_cost(to_do: &[&Run], plan: &Plan, records: &[RunRecord], study: &Path) -> Cost {
     let runs = plan.runs.iter().zip(records).filter(|(_, record)| record.finished());
     let done: Vec<Done> = runs
@@ -43,17 +42,18 @@ pub fn expected_cost(to_do: &[&Run], plan: &Plan, records: &[RunRecord], study: 
             })
         })
         .collect();
-    let mut cost = Cost { wall_s: 0.0, disk_bytes: None, basis: done.len() };
+    let mut cost = Cost { wall_s: 0.0, disk_bytes: 0.0, basis: done.len() };
     for run in to_do {
         let ratio = |d: &&Done| (run.memory_bytes as f64 / d.run.memory_bytes as f64).ln().abs();
         let similar: Vec<&Done> = done.iter().filter(|d| ratio(d) < SIMILAR.ln()).collect();
         let like = if similar.is_empty() { done.iter().collect() } else { similar };
-        let sum = |value: fn(&Done) -> f64| like.iter().map(|d| value(d)).sum::<f64>();
-        let scale = if like.is_empty() { 1.0 } else { sum(|d| d.time) / sum(|d| d.run.wall_s) };
-        cost.wall_s += run.wall_s * scale;
-        if let Some(mean) = mean(like.iter().filter_map(|d| d.disk)) {
-            cost.disk_bytes = Some(cost.disk_bytes.unwrap_or(0.0) + mean);
-        }
+        let scale = |pairs: &mut dyn Iterator<Item = (f64, f64)>| {
+            let (measured, estimated) = pairs.fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+            if estimated > 0.0 { measured / estimated } else { 1.0 }
+        };
+        cost.wall_s += run.wall_s * scale(&mut like.iter().map(|d| (d.time, d.run.wall_s)));
+        let sizes = |d: &&Done| Some((d.disk?, d.run.disk_bytes as f64));
+        cost.disk_bytes += run.disk_bytes as f64 * scale(&mut like.iter().filter_map(sizes));
     }
     cost
 }
@@ -92,6 +92,8 @@ mod tests {
             ending: String::new(),
             end_s: 1.0,
             memory_bytes: memory,
+            disk_bytes: 200,
+            checkpoint_bytes: 0,
             wall_s,
         }
     }
@@ -121,7 +123,7 @@ mod tests {
         let to_do = [&plan.runs[3]];
         let none: Vec<RunRecord> = (0..4).map(|_| record(None)).collect();
         let expected = expected_cost(&to_do, &plan, &none, nowhere);
-        assert_eq!(expected, Cost { wall_s: 20.0, disk_bytes: None, basis: 0 });
+        assert_eq!(expected, Cost { wall_s: 20.0, disk_bytes: 200.0, basis: 0 });
         // 12 s on one thread and 4 s on two threads where 40 s were expected: a half.
         let mut some = none.clone();
         some[0] = record(Some((12.0, 1)));
@@ -133,11 +135,11 @@ mod tests {
         let coarse = [none[0].clone(), none[1].clone(), some[2].clone(), none[3].clone()];
         let other = expected_cost(&to_do, &plan, &coarse, nowhere);
         assert_eq!((other.wall_s, other.basis), (20.0, 1));
-        // Folders of finished runs give the size.
+        // Folders of finished runs give the size: 300 bytes where 200 were expected.
         let outputs = plan.runs[0].folder(nowhere).join("fields");
         std::fs::create_dir_all(&outputs).unwrap();
         std::fs::write(outputs.join("a"), [0; 300]).unwrap();
         let sized = expected_cost(&to_do, &plan, &some, nowhere);
-        assert_eq!(sized.disk_bytes, Some(300.0));
+        assert_eq!(sized.disk_bytes, 300.0);
     }
 }

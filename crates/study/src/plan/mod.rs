@@ -77,6 +77,12 @@ pub struct Run {
     pub end_s: f64,
     /// Estimated memory [bytes].
     pub memory_bytes: u64,
+    /// Estimated size of the run folder without checkpoints [bytes].
+    #[serde(default)]
+    pub disk_bytes: u64,
+    /// Estimated size of the checkpoints during the run [bytes].
+    #[serde(default)]
+    pub checkpoint_bytes: u64,
     /// Estimated wall-clock time on one thread up to the expected end [s].
     pub wall_s: f64,
 }

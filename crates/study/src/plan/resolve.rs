@@ -104,6 +104,8 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
         ending,
         end_s: case.plan.end,
         memory_bytes: estimate.memory_bytes,
+        disk_bytes: estimate.disk_bytes,
+        checkpoint_bytes: estimate.checkpoint_bytes,
         // JSON has no infinity.
         wall_s: estimate.wall_s.min(f64::MAX),
         ..Run::default()
