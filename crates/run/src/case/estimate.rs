@@ -1,4 +1,4 @@
-//! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall-clock time.
+//! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall time.
 
 use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
 use super::settling::{impact_speed, is_free, landing_time};
