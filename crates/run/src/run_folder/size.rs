@@ -1,7 +1,7 @@
 //! Size of the files of a run before it starts, from the case.
 //!
-//! Tables and networks of contacts are left out. A pair counts as having four events besides its two
-//! landings.
+//! Tables and networks of contacts are left out. A pair counts as having four events besides its
+//! two landings.
 
 use grainwake_formats::{diagnostics, grains, probes};
 use grainwake_shape::{Field, Shape};
