@@ -5,12 +5,15 @@ pub fn title(quantity: &str) -> String {
     quantity.replace('_', " ")
 }
 
-/// Value with three significant digits; "?" if it is not finite.
+/// Value with three significant digits; "?" if it is not a number.
 pub fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }
-    if !value.is_finite() {
+    if let Some(text) = infinite(value) {
+        return text;
+    }
+    if value.is_nan() {
         return "?".into();
     }
     let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
@@ -28,8 +31,16 @@ pub fn quantity_value(quantity: &str, value: f64) -> String {
     significant(value)
 }
 
+/// Text of an infinite value.
+fn infinite(value: f64) -> Option<String> {
+    value.is_infinite().then(|| if value > 0.0 { "∞".into() } else { "−∞".into() })
+}
+
 /// Percentage with one decimal.
 pub fn percent(value: f64) -> String {
+    if let Some(text) = infinite(value) {
+        return text;
+    }
     format!("{:.1} %", 100.0 * value).replace('-', "−")
 }
 

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::observation::{Observation, matched, observations, ranges, with_factor};
+use super::observation::{Observation, is_time, matched, observations, ranges, with_factor};
 use super::statistics::{
     Estimate, coefficient_of_variation, relative_spread_test, signed_rank, spearman,
 };
+use super::survival::log_rank;
 use crate::format::{p_value, percent, significant, title};
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Claim, Sign, Test};
@@ -83,7 +84,10 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
             let all = included(ranges(&all, over));
             trend(&all, with, *sign, &format!("range of {name}"))
         }
-        Test::Order { axis, more, less } => order(&included(all), axis, [more, less], &name),
+        Test::Order { axis, more, less } => {
+            let by_rates = is_time(&claim.quantity) && !claim.observed;
+            order(&included(all), axis, [more, less], &name, by_rates)
+        }
         Test::Equal { axis, values: [a, b], within } => {
             equal(&included(all), axis, [a, b], *within, &name)
         }
@@ -104,17 +108,42 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
         let censored = outcome.censored;
         outcome.says += &match claim.test {
             Test::Trend { .. } | Test::Range { .. } => {
-                format!("; {censored} right-censored at the landing, ranked last with equal ranks")
+                format!("; {censored} without the event, ranked last with equal ranks")
             }
-            _ => format!("; {censored} right-censored: lower bounds, as the pair landed before"),
+            Test::Spread { .. } => format!("; {censored} pairs without the event are left out"),
+            _ => format!("; {censored} without the event before the landing, which count as last"),
         };
     }
     outcome
 }
 
-fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
+/// Value that stands for the time of an event that did not occur: far beyond all others, but finite,
+/// so that two of them are equal and cancel.
+const LAST: f64 = 1e9;
+
+/// Returns the value of an observation with that of a missing event beyond all others.
+fn last(observation: &Observation) -> f64 {
+    if observation.censored { LAST } else { observation.value }
+}
+
+/// Returns an estimate in which effects that contain a missing event are infinite.
+fn unbounded(estimate: Estimate) -> Estimate {
+    let end = |v: f64| if v.abs() > 1e-3 * LAST { v.signum() * f64::INFINITY } else { v };
+    let Estimate { value, low, high, .. } = estimate;
+    Estimate { value: end(value), low: end(low), high: end(high), ..estimate }
+}
+
+/// Tests an order by the signed ranks of the differences, or `by_rates` of the event: the log-rank
+/// test.
+fn order(
+    all: &[Observation],
+    axis: &str,
+    [more, less]: [&str; 2],
+    name: &str,
+    by_rates: bool,
+) -> Outcome {
     let pairs = matched(all, axis, more, less);
-    let differences: Vec<f64> = pairs.iter().map(|(a, b)| a.value - b.value).collect();
+    let differences: Vec<f64> = pairs.iter().map(|(a, b)| last(a) - last(b)).collect();
     let larger = differences.iter().filter(|d| **d > 0.0).count();
     let says = |e: &Estimate| {
         format!(
@@ -126,14 +155,19 @@ fn order(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -
             probability(e)
         )
     };
-    let estimate = signed_rank(&differences);
+    let mut estimate = signed_rank(&differences).map(unbounded);
+    if by_rates {
+        let strata: Vec<_> =
+            pairs.iter().map(|(a, b)| [a.durations.clone(), b.durations.clone()]).collect();
+        estimate = estimate.zip(log_rank(&strata)).map(|(e, p)| Estimate { p, ..e });
+    }
     Outcome::new(counts(&pairs), Effect::Difference, Claimed::Positive, estimate, says)
 }
 
 fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
     let pairs = matched(all, axis, a, b);
     let relative = |(a, b): &(&Observation, &Observation)| {
-        relative_difference(a.value, b.value, 0.5 * (a.value + b.value))
+        relative_difference(last(a), last(b), 0.5 * (last(a) + last(b)))
     };
     let relative: Vec<f64> = pairs.iter().map(relative).collect();
     let says = |e: &Estimate| {
@@ -150,8 +184,9 @@ fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: 
 
 fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
     let pairs = matched(all, axis, more, less);
-    let (first, second): (Vec<f64>, Vec<f64>) =
-        pairs.iter().map(|(a, b)| (a.value, b.value)).unzip();
+    let counted = counts(&pairs);
+    let kept = pairs.iter().filter(|(a, b)| !a.censored && !b.censored);
+    let (first, second): (Vec<f64>, Vec<f64>) = kept.map(|(a, b)| (a.value, b.value)).unzip();
     let variation = |v: &[f64]| coefficient_of_variation(v).map_or("?".into(), percent);
     let says = |e: &Estimate| {
         format!(
@@ -164,7 +199,7 @@ fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) 
         )
     };
     let estimate = relative_spread_test(&first, &second);
-    Outcome::new(counts(&pairs), Effect::RankCorrelation, Claimed::Positive, estimate, says)
+    Outcome::new(counted, Effect::RankCorrelation, Claimed::Positive, estimate, says)
 }
 
 fn trend(all: &[Observation], with: &str, sign: Sign, name: &str) -> Outcome {
@@ -195,7 +230,7 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     let model = &reference.model;
     let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
     let relative =
-        |o: &&Observation| relative_difference(o.value, reference.value, reference.value);
+        |o: &&Observation| relative_difference(last(o), reference.value, reference.value);
     let relative: Vec<f64> = others.iter().map(relative).collect();
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
     let largest = relative.iter().fold(0.0, larger);
@@ -206,11 +241,12 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
             percent(e.value),
             interval(e, percent),
             e.n,
-            percent(largest)
+            percent(if largest > 1e-3 * LAST { f64::INFINITY } else { largest })
         )
     };
     let censored = others.iter().filter(|o| o.censored).count();
-    Outcome::new((others.len(), censored), effect, claimed, signed_rank(&relative), says)
+    let estimate = signed_rank(&relative).map(unbounded);
+    Outcome::new((others.len(), censored), effect, claimed, estimate, says)
 }
 
 /// Difference of two values over `scale`; zero for equal values, also if both are zero.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::observation::{Member, members};
-use super::statistics::{bootstrap_interval, outcome_interval};
+use super::statistics::{bootstrap_interval, share_interval};
 use crate::measure::mean;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Condition};
@@ -33,8 +33,8 @@ pub struct FactorMean {
     pub models: usize,
     /// Mean over the models of the mean over their members, without right-censored values.
     pub mean: f64,
-    /// 95 % interval of a bootstrap over models and members, of a share of equal outcomes the exact
-    /// one; none for a single run.
+    /// 95 % interval, of a share that of Clopper and Pearson, else of a bootstrap over models and
+    /// members; none for a single run.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -54,7 +54,7 @@ pub fn factor_means(analysis: &Analysis, records: &[RunRecord]) -> Vec<FactorMea
     let mut out = Vec::new();
     for quantity in share.iter().chain(&request.quantities) {
         let interval = |values: &[Vec<f64>]| match quantity == KISSING_SHARE {
-            true => outcome_interval(values, [0.0, 1.0]),
+            true => share_interval(values),
             false => bootstrap_interval(values),
         };
         for level in request.levels(records) {

@@ -2,17 +2,16 @@
 //! first contact, and how both depend on the level of an axis and on the grid.
 //!
 //! The share of a set of models is the mean over the models of the share of their members.
-//! Intervals are 95 % intervals of a bootstrap over models and members, or exact ones if all
-//! outcomes are equal. Two sets are compared over
-//! the models that are equal on all other axes, and their members are drawn together.
+//! Two sets are compared over the models that are equal on all other axes. A model kisses if more
+//! than half of its members do.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::observation::{Member, members, other_levels, unique};
-use super::statistics::{median, outcome_interval, signed_rank};
-use super::survival::{Duration, log_rank, median_time};
+use super::statistics::{difference_interval, median, share_interval, sign_flip_p, signed_rank};
+use super::survival::{Duration, cumulative_incidence, log_rank, median_time};
 use crate::measure::mean;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Kissing};
@@ -45,11 +44,14 @@ pub struct Level {
     pub share: f64,
     /// Interval of the share.
     pub interval: [f64; 2],
-    /// Median of the time of the first contact (Kaplan and Meier); none if fewer than half kiss.
+    /// Time by which half of the runs have kissed, if they have.
     pub median_time: Option<f64>,
-    /// All times, for the figure.
+    /// Times of contacts, each with the share of runs that have kissed by then, for the figure.
     #[serde(skip)]
-    pub durations: Vec<Duration>,
+    pub incidence: Vec<(f64, f64)>,
+    /// Time of the last contact or landing.
+    #[serde(skip)]
+    pub last: f64,
 }
 
 /// Difference between two levels, over the models that are equal on all other axes.
@@ -67,6 +69,9 @@ pub struct LevelDifference {
     pub share: f64,
     /// Interval of the difference of the shares.
     pub interval: [f64; 2],
+    /// Two-sided p value of this difference, by exchanging the levels within the pairs; none below
+    /// six pairs.
+    pub share_p: Option<f64>,
     /// Two-sided p value of the log-rank test of the times, stratified by the other axes, the
     /// members of a model counting as one; none below six pairs.
     pub log_rank_p: Option<f64>,
@@ -111,7 +116,7 @@ impl Outcomes {
         let kissed = self.members.values().filter(|d| !d.censored).count();
         kissed as f64 / self.members.len() as f64
     }
-    /// Median time; none if fewer than half of the members kiss.
+    /// Median time; none unless more than half of the members kiss.
     fn median_time(&self) -> Option<f64> {
         median_time(&self.durations())
     }
@@ -199,19 +204,23 @@ fn matched<'a>(models: &[&'a Outcomes], axis: &str, first: &str, second: &str) -
 
 fn summary(level: &str, grid: Option<&str>, models: &[&Outcomes]) -> Option<Level> {
     let shares: Vec<f64> = models.iter().map(|m| m.share()).collect();
-    let durations: Vec<Duration> = models.iter().flat_map(|m| m.durations()).collect();
     let count = |test: fn(f64) -> bool| shares.iter().filter(|s| test(**s)).count();
     let members: Vec<Vec<f64>> = models.iter().map(|m| kissed(&m.members)).collect();
+    let durations: Vec<Vec<Duration>> = models.iter().map(|m| m.durations()).collect();
+    let incidence = cumulative_incidence(&durations);
+    // The last digits of the sum must not decide.
+    let half = incidence.iter().find(|(_, share)| *share >= 0.5 - 1e-12);
     Some(Level {
         level: level.to_owned(),
         grid: grid.map(str::to_owned),
         models: models.len(),
-        runs: durations.len(),
+        runs: members.iter().map(Vec::len).sum(),
         all_some_none: [count(|s| s == 1.0), count(|s| s > 0.0 && s < 1.0), count(|s| s == 0.0)],
         share: mean(shares.iter().copied())?,
-        interval: outcome_interval(&members, [0.0, 1.0])?,
-        median_time: median_time(&durations),
-        durations,
+        interval: share_interval(&members)?,
+        median_time: half.map(|(time, _)| *time),
+        last: durations.iter().flatten().map(|d| d.time).fold(0.0, f64::max),
+        incidence,
     })
 }
 
@@ -220,7 +229,7 @@ fn difference(
     grid: Option<&str>,
     pairs: &[Pair],
 ) -> Option<LevelDifference> {
-    let (share, interval) = share_difference(pairs)?;
+    let (share, interval, differences) = share_difference(pairs)?;
     let strata: Vec<[Vec<Duration>; 2]> =
         pairs.iter().map(|pair| pair.map(Outcomes::durations)).collect();
     let shifts: Vec<f64> =
@@ -233,6 +242,7 @@ fn difference(
         pairs: pairs.len(),
         share,
         interval,
+        share_p: sign_flip_p(&differences),
         log_rank_p: log_rank(&strata),
         time_shift: shift.map(|s| s.value),
         time_shift_interval: shift.map(|s| [s.low, s.high]),
@@ -240,8 +250,8 @@ fn difference(
 }
 
 fn refinement(level: Option<&str>, grids: &[String], pairs: &[Pair]) -> Option<GridDifference> {
-    let (share, interval) = share_difference(pairs)?;
-    let same = pairs.iter().filter(|[a, b]| (a.share() >= 0.5) == (b.share() >= 0.5)).count();
+    let (share, interval, _) = share_difference(pairs)?;
+    let same = pairs.iter().filter(|[a, b]| (a.share() > 0.5) == (b.share() > 0.5)).count();
     let times = pairs.iter().filter_map(|[a, b]| Some([a.median_time()?, b.median_time()?]));
     let relative: Vec<f64> = times.map(|[a, b]| (a - b).abs() / b).collect();
     Some(GridDifference {
@@ -256,15 +266,16 @@ fn refinement(level: Option<&str>, grids: &[String], pairs: &[Pair]) -> Option<G
     })
 }
 
-/// Mean difference of the shares of two sets, over the members that both have, with its interval.
-fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2])> {
+/// Mean difference of the shares of two sets, over the members that both have, its interval, and the
+/// differences of the pairs.
+fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2], Vec<f64>)> {
     let common = |[a, b]: &Pair| -> Vec<f64> {
         let both = a.members.iter().filter_map(|(n, first)| Some((first, b.members.get(n)?)));
         both.map(|(a, b)| one_if_kissed(a) - one_if_kissed(b)).collect()
     };
     let members: Vec<Vec<f64>> = pairs.iter().map(common).filter(|m| !m.is_empty()).collect();
-    let means = members.iter().filter_map(|m| mean(m.iter().copied()));
-    Some((mean(means)?, outcome_interval(&members, [-1.0, 1.0])?))
+    let means: Vec<f64> = members.iter().filter_map(|m| mean(m.iter().copied())).collect();
+    Some((mean(means.iter().copied())?, difference_interval(&members)?, means))
 }
 
 fn kissed(members: &BTreeMap<usize, Duration>) -> Vec<f64> {

@@ -4,10 +4,13 @@
 use std::collections::BTreeMap;
 
 use super::statistics::median;
+use super::survival::{Duration, median_time};
+use crate::measure::mean;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Condition, Range};
 
-/// Observed value of a quantity for one model: the median over the ensemble.
+/// Observed value of a quantity for one model: the median of a time over the members, those without
+/// the event last; the mean of another quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
     /// Name of the model.
@@ -16,12 +19,14 @@ pub struct Observation {
     pub levels: BTreeMap<String, String>,
     /// Numerical factors.
     pub factors: BTreeMap<String, f64>,
-    /// Value; the lower bound of a censored observation.
+    /// Value; of a censored observation the median of the times of landings and events.
     pub value: f64,
+    /// Times of the members; empty of a quantity that is no time.
+    pub durations: Vec<Duration>,
     /// Smallest and largest value over the ensemble.
     pub range: (f64, f64),
-    /// Whether the observation is right-censored: the pair landed, or the run ended, before the
-    /// event.
+    /// Whether the observation is right-censored: in half of the members or more, the pair landed,
+    /// or the run ended, before the event.
     pub censored: bool,
 }
 
@@ -93,28 +98,56 @@ pub fn members<'a>(
     models
 }
 
-/// Returns the observations of a quantity for all models that meet the conditions.
+/// Times until an event, and stages that end with one.
+const TIMES: [&str; 6] =
+    ["kiss_time", "tumble_time", "pass_time", "separation_time", "kissing_stage", "contact_stage"];
+
+/// Returns whether a quantity is the time until an event that need not occur.
+pub fn is_time(quantity: &str) -> bool {
+    TIMES.contains(&quantity)
+}
+
+/// Returns the observations of a quantity for all models that meet the conditions and of which more
+/// than half of the finished members have the quantity.
 pub fn observations(
     records: &[RunRecord],
     quantity: &str,
     when: &BTreeMap<String, Condition>,
 ) -> Vec<Observation> {
+    let finished = |model: &str| {
+        let of_model = records.iter().filter(|r| r.model == model && r.finished());
+        of_model.filter(|record| meets(record, when)).count()
+    };
     let observation = |members: Vec<Member>| {
-        let values: Vec<f64> = members.iter().map(|(_, v, _)| *v).collect();
         let first = members[0].0;
-        Observation {
+        if 2 * members.len() <= finished(&first.model) {
+            return None;
+        }
+        let values: Vec<f64> = members.iter().map(|(_, v, _)| *v).collect();
+        let duration = |&(_, time, censored): &Member| Duration { time, censored };
+        let durations: Vec<Duration> = match is_time(quantity) {
+            true => members.iter().map(duration).collect(),
+            false => Vec::new(),
+        };
+        let (value, censored) = match (is_time(quantity), median_time(&durations)) {
+            (false, _) => (mean(values.iter().copied())?, false),
+            (true, Some(time)) => (time, false),
+            (true, None) => (median(&values)?, true),
+        };
+        Some(Observation {
             model: first.model.clone(),
             levels: first.levels.clone(),
             factors: first.factors.clone(),
-            value: median(&values).unwrap_or(f64::NAN),
+            value,
+            durations,
             range: (
                 values.iter().copied().fold(f64::INFINITY, f64::min),
                 values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             ),
-            censored: 2 * members.iter().filter(|(.., c)| *c).count() >= members.len(),
-        }
+            censored,
+        })
     };
-    members(records, quantity, when).into_iter().map(observation).collect()
+    members(records, quantity, when).into_iter().filter_map(observation).collect()
 }
 
 /// Returns whether a run meets all conditions.

@@ -1,14 +1,19 @@
 //! Rank statistics and bootstrap intervals of small samples, without an assumption about the
 //! distribution of the values.
 
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
 use crate::measure::mean;
 
 /// Number of samples of the bootstrap.
 const SAMPLES: usize = 2000;
+/// Largest number of values whose orders are all counted.
+const ENUMERATED: usize = 8;
+/// Number of random orders or combinations of signs that replace all of them.
+const RANDOM_ORDERS: usize = 100_000;
 
 /// Estimate with its 95 % confidence interval and two-sided p value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,39 +71,61 @@ fn pearson(x: &[f64], y: &[f64]) -> Option<f64> {
 
 /// Computes Spearman's rank correlation; none below four pairs, or if a sample does not vary.
 ///
-/// The interval is Fisher's z with the standard error of Bonett and Wright (2000); the p value is
-/// that of Student's t with n - 2 degrees of freedom, for a perfect correlation the exact one.
+/// The interval is Fisher's z with the standard error of Bonett and Wright (2000). The p value is
+/// the share of the orders of `y` with as large a correlation: of all orders up to eight pairs, of
+/// 100000 random ones beyond.
 pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     let n = x.len();
     if n < 4 || y.len() != n {
         return None;
     }
-    let r = pearson(&ranks(x), &ranks(y))?;
-    let half_width =
-        Normal::standard().inverse_cdf(0.975) * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
+    let (x, y) = (ranks(x), ranks(y));
+    let r = pearson(&x, &y)?;
+    let quantile = Normal::standard().inverse_cdf(0.975);
+    let half_width = quantile * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
     // A perfect correlation has no finite z; the next smaller possible value replaces it.
     let steps = (n * (n * n - 1)) as f64;
     let z = r.clamp(-1.0 + 6.0 / steps, 1.0 - 6.0 / steps).atanh();
-    let freedom = n as f64 - 2.0;
-    let p = match StudentsT::new(0.0, 1.0, freedom) {
-        Ok(t) if r.abs() < 1.0 => 2.0 * t.sf(r.abs() * (freedom / (1.0 - r * r)).sqrt()),
-        _ => perfect_rank_p(x),
-    };
-    Some(Estimate { n, value: r, low: (z - half_width).tanh(), high: (z + half_width).tanh(), p })
+    let (low, high) = ((z - half_width).tanh(), (z + half_width).tanh());
+    Some(Estimate { n, value: r, low, high, p: order_p(&x, &y) })
 }
 
-/// Returns the two-sided p value of a perfect rank correlation: the share of the orders of `values`
-/// that give it, in either direction.
-fn perfect_rank_p(values: &[f64]) -> f64 {
-    let ranks = ranks(values);
-    // n! over the product of the factorials of the numbers of equal values.
-    let mut orders = 1.0;
-    let mut seen: Vec<f64> = Vec::new();
-    for (n, rank) in ranks.iter().enumerate() {
-        seen.push(*rank);
-        orders *= (n + 1) as f64 / seen.iter().filter(|other| *other == rank).count() as f64;
+/// Returns the share of the orders of `y` whose covariance with `x` is as large as in the given
+/// order.
+fn order_p(x: &[f64], y: &[f64]) -> f64 {
+    let middle = 0.5 * (x.len() as f64 + 1.0);
+    let covariance = |y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - middle) * y).sum::<f64>().abs();
+    // Ranks are multiples of one half, so that sums of their products are exact to rounding.
+    let least = covariance(y) - 1e-6;
+    let mut y = y.to_vec();
+    let (mut as_far, mut orders) = (0.0, 0.0);
+    let mut count = |y: &[f64]| {
+        as_far += f64::from(u8::from(covariance(y) >= least));
+        orders += 1.0;
+    };
+    if y.len() <= ENUMERATED {
+        for_all_orders(&mut y, 0, &mut count);
+    } else {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
+        count(&y.clone());
+        for _ in 0..RANDOM_ORDERS {
+            y.shuffle(&mut random);
+            count(&y);
+        }
     }
-    2.0 / orders
+    as_far / orders
+}
+
+/// Calls `visit` with all orders of the values from index `first` on.
+fn for_all_orders(values: &mut [f64], first: usize, visit: &mut impl FnMut(&[f64])) {
+    if first == values.len() {
+        return visit(values);
+    }
+    for other in first..values.len() {
+        values.swap(first, other);
+        for_all_orders(values, first + 1, visit);
+        values.swap(first, other);
+    }
 }
 
 /// Performs Wilcoxon's signed-rank test of paired differences.
@@ -156,7 +183,7 @@ pub fn sign_flip_p(values: &[f64]) -> Option<f64> {
     }
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
     let mut sum = || values.iter().map(|v| if random.random() { *v } else { -v }).sum();
-    let sums: Vec<f64> = (0..100_000).map(|_| sum()).collect();
+    let sums: Vec<f64> = (0..RANDOM_ORDERS).map(|_| sum()).collect();
     // The observed combination is one of them.
     Some((as_far(&sums) + 1.0) / (sums.len() as f64 + 1.0))
 }
@@ -193,36 +220,54 @@ fn critical_value(counts: &[f64]) -> usize {
 }
 
 /// Returns the 95 % interval of the mean over models of the mean over members, by a bootstrap that
-/// draws models, then members of each model, with replacement.
+/// draws models and numbers of members with replacement. A sample has the same numbers for all
+/// models, because members with the same number have the same start.
 ///
 /// Equal arguments give equal results.
 pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
-    let mut draw = |count: usize| random.random_range(0..count);
+    let largest = models.iter().map(Vec::len).max().unwrap_or(0);
     let mut sample = || {
-        let models = (0..models.len()).filter_map(|_| {
-            let members = models.get(draw(models.len()))?;
-            mean(members.iter().map(|_| members[draw(members.len())]))
+        // Places between the first and the last member, for models with fewer members too.
+        let places: Vec<f64> = (0..largest).map(|_| random.random()).collect();
+        let drawn = |members: &Vec<f64>| {
+            let place = |at: &f64| members[(at * members.len() as f64) as usize];
+            mean(places[..members.len()].iter().map(place))
+        };
+        let means = (0..models.len()).filter_map(|_| {
+            let model = models.get(random.random_range(0..models.len()))?;
+            drawn(model)
         });
-        mean(models)
+        mean(means)
     };
     let samples: Vec<f64> = (0..SAMPLES).filter_map(|_| sample()).collect();
     Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }
 
-/// Returns the 95 % interval of the mean over models of outcomes of their members between `least`
-/// and `most`: shares (0 to 1) or differences of shares (-1 to 1).
+/// Returns the 95 % interval of the mean over models of the share of their members with an event,
+/// `outcomes` 0 or 1: that of Clopper and Pearson with models as units, for any sum of shares.
+pub fn share_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let n = models.len() as f64;
+    let events: f64 = models.iter().filter_map(|m| mean(m.iter().copied())).sum();
+    let bound = |a: f64, b: f64, p: f64| Some(Beta::new(a, b).ok()?.inverse_cdf(p));
+    let low = if events > 0.0 { bound(events, n - events + 1.0, 0.025)? } else { 0.0 };
+    let high = if events < n { bound(events + 1.0, n - events, 0.975)? } else { 1.0 };
+    (n > 0.0).then_some([low, high])
+}
+
+/// Returns the 95 % interval of the mean over models of the differences of outcomes of their
+/// members, each -1, 0 or 1.
 ///
-/// It is that of [`bootstrap_interval`], which has no width if all outcomes are equal. Then the
+/// It is that of [`bootstrap_interval`], which has no width if all differences are equal. Then the
 /// limit of Clopper and Pearson for the number of models bounds the part of the models with another
-/// outcome. The ends of the interval are the means if that part has the outcome `least` or `most`.
-pub fn outcome_interval(models: &[Vec<f64>], [least, most]: [f64; 2]) -> Option<[f64; 2]> {
+/// difference.
+pub fn difference_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     let first = *models.iter().flatten().next()?;
     if models.iter().flatten().any(|value| *value != first) {
         return bootstrap_interval(models);
     }
     let other = 1.0 - 0.025_f64.powf(1.0 / models.len() as f64);
-    Some([least, most].map(|outcome| first + other * (outcome - first)))
+    Some([-1.0, 1.0].map(|outcome| first + other * (outcome - first)))
 }
 
 /// Returns the median; none of an empty sample.
@@ -237,8 +282,13 @@ pub fn quantile(values: &[f64], part: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let at = part.clamp(0.0, 1.0) * last as f64;
     let low = at.floor() as usize;
-    let high = (low + 1).min(last);
-    Some(sorted[low] + (at - low as f64) * (sorted[high] - sorted[low]))
+    let (part, next) = (at - low as f64, sorted[(low + 1).min(last)]);
+    // Without arithmetic where an infinite value would give none.
+    Some(if part == 0.0 || next == sorted[low] {
+        sorted[low]
+    } else {
+        sorted[low] + part * (next - sorted[low])
+    })
 }
 
 /// Tests whether the first of two paired positive samples has the larger relative spread.

@@ -1,6 +1,7 @@
-//! Right-censored times: Kaplan and Meier's estimate of the distribution, and the log-rank test.
+//! Times until an event that need not occur: their median, the share of runs with the event by a
+//! time, and the log-rank test.
 
-use super::statistics::sign_flip_p;
+use super::statistics::{median, sign_flip_p};
 
 /// A time until an event, or until the observation ended without it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,22 +12,35 @@ pub struct Duration {
     pub censored: bool,
 }
 
-/// Returns Kaplan and Meier's estimate: the times of events, ascending, each with the probability
-/// that the event has occurred by then.
-pub fn kaplan_meier(durations: &[Duration]) -> Vec<(f64, f64)> {
-    let mut survival = 1.0;
-    let step = |(time, [events, at_risk]): (f64, [f64; 2])| {
-        survival *= 1.0 - events / at_risk;
-        (time, 1.0 - survival)
-    };
-    events(durations).into_iter().map(step).collect()
+impl Duration {
+    /// Returns the time of the event; infinity if it did not occur.
+    pub fn event(&self) -> f64 {
+        if self.censored { f64::INFINITY } else { self.time }
+    }
 }
 
-/// Returns the time by which the event has occurred with a probability of one half, if it has.
+/// Returns the median time of the event, runs without it last; none if half of them are without.
 pub fn median_time(durations: &[Duration]) -> Option<f64> {
-    // The last digits of the product must not decide.
-    let half = 0.5 - 1e-12;
-    kaplan_meier(durations).into_iter().find(|(_, share)| *share >= half).map(|(time, _)| time)
+    let events: Vec<f64> = durations.iter().map(Duration::event).collect();
+    median(&events).filter(|time| time.is_finite())
+}
+
+/// Returns the times of events, ascending, each with the mean over the models of the share of their
+/// members in which the event has occurred by then (cumulative incidence).
+pub fn cumulative_incidence(models: &[Vec<Duration>]) -> Vec<(f64, f64)> {
+    let weighted = |model: &Vec<Duration>| {
+        let weight = 1.0 / (models.len() * model.len()) as f64;
+        let events = model.iter().filter(|d| !d.censored).map(move |d| (d.time, weight));
+        events.collect::<Vec<_>>()
+    };
+    let mut steps: Vec<(f64, f64)> = models.iter().flat_map(weighted).collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut share = 0.0;
+    for step in &mut steps {
+        share += step.1;
+        step.1 = share;
+    }
+    steps
 }
 
 /// Performs the log-rank test of two samples, stratified: each stratum is a pair of samples.

@@ -57,7 +57,8 @@ pub struct Finding {
     pub interval: Option<[f64; 2]>,
     /// Two-sided p value.
     pub p: Option<f64>,
-    /// p value adjusted for the number of claims, if the analysis states a false-discovery rate.
+    /// p value adjusted for the number of claims that name a direction, if the analysis states a
+    /// false-discovery rate.
     pub adjusted_p: Option<f64>,
     /// Size of an effect that does not matter, if known.
     pub negligible: Option<f64>,
@@ -68,19 +69,28 @@ pub struct Finding {
 pub fn evaluate(analysis: &Analysis, records: &[RunRecord]) -> Vec<Finding> {
     let rule = analysis.verdicts.clone().unwrap_or_default();
     let outcomes: Vec<Outcome> = analysis.claims.iter().map(|claim| test(claim, records)).collect();
-    let known: Vec<f64> = outcomes.iter().filter_map(|o| Some(o.estimate?.p)).collect();
+    let negligible = |claim: &Claim, outcome: &Outcome| rule.negligible_effect(claim, outcome);
+    // Claims of equality are judged by their intervals, and are not in the family.
+    let directed = |claim: &Claim, outcome: &Outcome| match outcome.claimed {
+        Claimed::Positive | Claimed::Negative => true,
+        Claimed::Nothing => negligible(claim, outcome).is_none(),
+        Claimed::AtMost(_) => false,
+    };
+    let family = analysis.claims.iter().zip(&outcomes).filter(|(c, o)| directed(c, o));
+    let known: Vec<f64> = family.filter_map(|(_, o)| Some(o.estimate?.p)).collect();
     let mut adjusted = false_discovery_adjusted(&known).into_iter();
     let unconverged = |claim: &Claim| {
         let resolution = analysis.resolution.as_ref();
         resolution.is_some_and(|r| r.unconverged.contains(&claim.quantity))
     };
     let finding = |(claim, mut outcome): (&Claim, Outcome)| {
-        let adjusted_p = outcome.estimate.and_then(|_| adjusted.next());
+        let in_family = directed(claim, &outcome);
+        let adjusted_p = outcome.estimate.filter(|_| in_family).and_then(|_| adjusted.next());
         let adjusted_p = adjusted_p.filter(|_| rule.false_discovery_rate.is_some());
         if let Some(p) = adjusted_p {
             outcome.says += &format!("; adjusted p {}", p_value(p));
         }
-        let negligible = rule.negligible_effect(claim, &outcome);
+        let negligible = negligible(claim, &outcome);
         let judge = |estimate| judge(&rule, &outcome, estimate, adjusted_p, negligible);
         let mut verdict = outcome.estimate.map_or(Verdict::Open, judge);
         if unconverged(claim) {

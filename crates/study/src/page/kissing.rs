@@ -12,10 +12,8 @@ pub(super) fn tables(results: &KissingResults) -> Markup {
     html! {
         p {
             "Share of runs in which the pair comes into contact before it lands: mean over the \
-             models of the share of their members, with 95 % intervals of a bootstrap over models \
-             and members (exact binomial for the number of models if all runs have the same \
-             outcome). The median time is Kaplan and Meier's; a pair that lands first is \
-             right-censored."
+             models of the share of their members, with Clopper and Pearson's 95 % interval for \
+             the number of models. The median time is that by which half of the runs have kissed."
         }
         (levels(&results.levels, gridded))
         @if !results.differences.is_empty() { (differences(&results.differences, gridded)) }
@@ -48,7 +46,7 @@ fn levels(levels: &[Level], gridded: bool) -> Markup {
 fn differences(differences: &[LevelDifference], gridded: bool) -> Markup {
     let mut columns = vec![text_column("first level less second")];
     columns.extend(gridded.then(|| text_column("grid")));
-    columns.extend(["pairs", "share", "95 % interval", "log-rank p"].map(number_column));
+    columns.extend(["pairs", "share", "95 % interval", "p", "log-rank p"].map(number_column));
     columns.extend(["time", "95 % interval"].map(number_column));
     let row = |d: &LevelDifference| {
         let mut row = vec![html! { (d.first) " − " (d.second) }];
@@ -57,6 +55,7 @@ fn differences(differences: &[LevelDifference], gridded: bool) -> Markup {
             html! { (d.pairs) },
             html! { (percent(d.share)) },
             interval(d.interval.map(percent)),
+            html! { (d.share_p.map_or("–".into(), p_value)) },
             html! { (d.log_rank_p.map_or("–".into(), p_value)) },
             optional(d.time_shift),
             d.time_shift_interval.map_or(html! { "–" }, |ends| interval(ends.map(significant))),
@@ -65,7 +64,8 @@ fn differences(differences: &[LevelDifference], gridded: bool) -> Markup {
     };
     html! {
         p {
-            "Differences over the models that are equal on all other axes. The log-rank test of \
+            "Differences over the models that are equal on all other axes. The p value of the \
+             share is that of exchanging the levels within the models. The log-rank test of \
              the times is stratified by these axes and includes pairs that land first; its p value \
              counts the members of a model as one. The difference of the times is the Hodges-Lehmann shift of the median times of models \
              that kiss at both levels."

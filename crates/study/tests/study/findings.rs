@@ -151,7 +151,7 @@ fn events_after_the_landing_are_right_censored() {
     assert!(
         found == "holds"
             && says.contains("for 16 of 16")
-            && says.contains("4 right-censored: lower bounds"),
+            && says.contains("4 without the event before the landing, which count as last"),
         "{says}"
     );
     let (found, says) = verdict(&late, &format!("observed = true\n{ORDER}"));
@@ -170,10 +170,7 @@ fn events_after_the_landing_are_right_censored() {
     });
     let falls = trend("sphericity", "falls", "o1");
     let (found, says) = verdict(&early, &falls);
-    assert!(
-        found == "holds" && says.contains("4 right-censored at the landing, ranked last"),
-        "{says}"
-    );
+    assert!(found == "holds" && says.contains("4 without the event, ranked last"), "{says}");
     let (_, says) = verdict(&early, &format!("observed = true\n{falls}"));
     assert!(says.contains("n = 12"), "{says}");
     let range = "observed = true\nquantity = \"kiss_time\"\ntest.range = { over = \"orientation\", with = \"sphericity\", sign = \"falls\" }";
@@ -208,6 +205,61 @@ fn members_count_as_one_model() {
     let found = observations(&all, "kiss_time", &BTreeMap::new());
     assert_eq!(found.len(), 65);
     assert_eq!((found[0].value, found[0].range), (time, (time - 0.2, time + 0.4)));
+    // A fourth member that lands early counts last: the median is between the later two.
+    let mut missed = all[66].clone();
+    missed.member = 3;
+    missed.pair = Some(PairMeasures { landing_time: Some(1.0), ..PairMeasures::default() });
+    all.push(missed.clone());
+    let found = observations(&all, "kiss_time", &BTreeMap::new());
+    assert!((found[0].value - (time + 0.2)).abs() < 1e-12 && !found[0].censored);
+    // With two of four members without contact the model misses, and has no time in contact.
+    all[65].pair = missed.pair;
+    assert!(observations(&all, "kiss_time", &BTreeMap::new())[0].censored);
+    for row in &mut all {
+        if let Some(pair) = row.pair.as_mut().filter(|pair| pair.kiss_time.is_some()) {
+            (pair.contact_stage, pair.parted) = (Some(1.0), Some(true));
+        }
+    }
+    assert_eq!(observations(&all, "contact_stage", &BTreeMap::new()).len(), 64);
+}
+
+#[test]
+fn orders_of_times_are_tested_by_rates_and_misses_are_last() {
+    // Orientation 1 misses for half of the grains, and kisses sooner for the others.
+    let split = |landing: f64| {
+        rows(|_, r, o| match o {
+            1 if r < 0.5 => PairMeasures { landing_time: Some(landing), ..PairMeasures::default() },
+            1 => kiss(9.0 + 0.1 * r),
+            _ => kiss(10.0 + 0.1 * r),
+        })
+    };
+    // The excess of contacts is a half in either direction for 8 of 16 grains each.
+    let (found, says) = verdict(&split(50.0), ORDER);
+    assert!(found == "open" && says.contains("p = 1.0000"), "{says}");
+    assert!(says.contains("−1.00 to ∞"), "{says}");
+    // A pair that lands before the other one kisses is compared with nothing: 2 of 2^8. It is no
+    // early contact either.
+    let (found, says) = verdict(&split(5.0), ORDER);
+    assert!(found == "open" && says.contains("p = 0.0078"), "{says}");
+    assert!(says.contains("−1.00 to ∞"), "{says}");
+    let split = split(5.0);
+    let (found, says) = verdict(&split, &format!("observed = true\n{ORDER}"));
+    assert!(found == "contradicted" && says.contains("for 0 of 8"), "{says}");
+}
+
+#[test]
+fn claims_of_equality_are_not_in_the_family() {
+    let chance = rows(|s, r, o| kiss(10.0 + noise(s, r, o)));
+    let equal = "quantity = \"kiss_time\"\ntest.equal = { axis = \"orientation\", values = [\"o2\", \"o4\"], within = 0.05 }";
+    let one = format!("[[claim]]\nsays = \"a\"\n{ORDER}\n");
+    let adjusted = |text: &str| {
+        let text = format!("{text}[verdicts]\nfalse_discovery_rate = 0.05\n");
+        let analysis = Analysis::parse("analysis.toml", &text, &models(&chance)).unwrap();
+        evaluate(&analysis, &chance).iter().map(|f| f.adjusted_p).collect::<Vec<_>>()
+    };
+    let alone = adjusted(&one);
+    let both = adjusted(&format!("{one}[[claim]]\nsays = \"b\"\n{equal}\n"));
+    assert!(alone[0].is_some() && both == [alone[0], None], "{both:?}");
 }
 
 #[test]

@@ -53,8 +53,9 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         top += of_panel(rows);
     }
     let caption = format!(
-        "Estimated effect and 95 % interval of {count} claims. Shaded: effects that do not matter, \
-         where the analysis states them. The rule of the verdicts is given above the table of \
+        "Estimated effect and 95 % interval of {count} claims; one that reaches the edge of a panel \
+         may have no bound. Shaded: effects that do not matter, where the analysis states them. \
+         The rule of the verdicts is given above the table of \
          claims."
     );
     Some(Figure::new("claims", "Claims with their effects", caption, drawing))

@@ -1,4 +1,4 @@
-//! Share of the pairs that have kissed, against time: Kaplan and Meier's curves.
+//! Share of the pairs that have kissed, against time.
 
 use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::drawing::{Anchor, Drawing};
@@ -11,7 +11,6 @@ use super::data::FigureData;
 use super::legend::LineStyle;
 use crate::analysis::kissing::Level;
 use crate::analysis::observation::unique;
-use crate::analysis::survival::kaplan_meier;
 
 const LEFT: f64 = 42.0;
 const GAP: f64 = 20.0;
@@ -24,9 +23,8 @@ const ACROSS: usize = 2;
 /// Draws one panel per grid, with one curve per level.
 pub fn figure(data: &FigureData) -> Option<Figure> {
     let levels = &data.kissing?.levels;
-    let shown: Vec<&Level> = levels.iter().filter(|l| !l.durations.is_empty()).collect();
-    let times = shown.iter().flat_map(|l| &l.durations).map(|d| d.time);
-    let end = times.fold(0.0, f64::max);
+    let shown: Vec<&Level> = levels.iter().filter(|l| l.runs > 0).collect();
+    let end = shown.iter().map(|l| l.last).fold(0.0, f64::max);
     if end == 0.0 {
         return None;
     }
@@ -62,29 +60,28 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             let n = names.iter().position(|name| *name == level.level).unwrap_or(0);
             let style = LineStyle::nth(n);
             let clip = format!("clip-share-{panel}-{}", level.level);
-            frame.curve(&mut drawing, &steps(level, end), style.colour, style.dash, &clip);
+            frame.curve(&mut drawing, &steps(level), style.colour, style.dash, &clip);
         }
         let last_row = panel + across >= panels;
         frame.outline(&mut drawing, Labelled { across: last_row, up: column == 0 });
     }
     let runs: usize = shown.iter().map(|l| l.runs).sum();
     let caption = format!(
-        "Probability that a pair has come into contact by time *t*, by Kaplan and Meier's \
-         estimate from {runs} runs; pairs that land first are right-censored. A curve ends at the \
-         last landing."
+        "Share of the pairs that have come into contact by time *t* (cumulative incidence), the \
+         mean over the models of {runs} runs. Pairs that land first never count. A curve ends at \
+         the last landing."
     );
     Some(Figure::new("kissing-share", "Share of the pairs that have kissed", caption, drawing))
 }
 
 /// Points of the step curve of a level, to its last observation.
-fn steps(level: &Level, end: f64) -> Vec<(f64, f64)> {
-    let last = level.durations.iter().map(|d| d.time).fold(0.0, f64::max).min(end);
+fn steps(level: &Level) -> Vec<(f64, f64)> {
     let mut points = vec![(0.0, 0.0)];
     let mut share = 0.0;
-    for (time, next) in kaplan_meier(&level.durations) {
+    for &(time, next) in &level.incidence {
         points.extend([(time, share), (time, next)]);
         share = next;
     }
-    points.push((last, share));
+    points.push((level.last, share));
     points
 }
