@@ -117,8 +117,8 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
     outcome
 }
 
-/// Value that stands for the time of an event that did not occur: far beyond all others, but finite,
-/// so that two of them are equal and cancel.
+/// Value that stands for the time of an event that did not occur: far beyond all others, but
+/// finite, so that two of them are equal and cancel.
 const LAST: f64 = 1e9;
 
 /// Returns the value of an observation with that of a missing event beyond all others.

@@ -266,8 +266,8 @@ fn refinement(level: Option<&str>, grids: &[String], pairs: &[Pair]) -> Option<G
     })
 }
 
-/// Mean difference of the shares of two sets, over the members that both have, its interval, and the
-/// differences of the pairs.
+/// Mean difference of the shares of two sets, over the members that both have, its interval, and
+/// the differences of the pairs.
 fn share_difference(pairs: &[Pair]) -> Option<(f64, [f64; 2], Vec<f64>)> {
     let common = |[a, b]: &Pair| -> Vec<f64> {
         let both = a.members.iter().filter_map(|(n, first)| Some((first, b.members.get(n)?)));
