@@ -52,5 +52,7 @@ cargo build --release --quiet
 
 # 4. Statistics of the study by a second route.
 "$work/full/bin/pip" install -q lifelines
-"$work/full/bin/python" studies/second_route.py results/dkt-morphology-ensemble orientation cells
+for study in ensemble members; do
+  "$work/full/bin/python" studies/second_route.py "results/dkt-morphology-$study" orientation cells
+done
 echo "python: all checks passed in $((SECONDS - started)) s"
