@@ -219,8 +219,9 @@ fn dry_run(
         0 => "no run is finished; runs that stop at rest or separation count to their end".into(),
         n => format!("from {}", count(n, "finished run")),
     };
-    let at_once =
-        |bytes: fn(&&&Run) -> u64| jobs as u64 * to_do.iter().map(|r| bytes(&r)).max().unwrap_or(0);
+    let at_once = |bytes: fn(&Run) -> u64| {
+        jobs as u64 * to_do.iter().map(|run| bytes(run)).max().unwrap_or(0)
+    };
     lines.push(format!(
         "{} of {} to do: about {time} with {jobs} at once, {} each ({basis}); {} of memory, {} of \
          disk space and {} of checkpoints",

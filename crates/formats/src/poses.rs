@@ -92,7 +92,7 @@ pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
             return Err(FormatError::line(file, 1, what));
         }
     };
-    let Rows { rows, time, before } = rows_at(file, table.column("time"), table.rows(), at)?;
+    let Rows { rows, time, rows_before } = rows_at(file, table.column("time"), table.rows(), at)?;
     let mut seen = BTreeSet::new();
     let mut poses = Vec::with_capacity(rows.len());
     for row in rows {
@@ -141,7 +141,7 @@ pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
         });
     }
     poses.sort_by_key(|pose| pose.grain);
-    Ok(Poses { time, poses, rows_before: before })
+    Ok(Poses { time, poses, rows_before })
 }
 
 /// Rows of a table at one time.
@@ -149,7 +149,7 @@ struct Rows {
     rows: Vec<usize>,
     time: Option<f64>,
     /// Number of rows at the time before.
-    before: Option<usize>,
+    rows_before: Option<usize>,
 }
 
 /// Returns the rows at the wanted time.
@@ -165,7 +165,7 @@ fn rows_at(
     let Some(times) = times else {
         return match at {
             Some(_) => Err(FormatError::line(file, 1, "the table has no column 'time'")),
-            None => Ok(Rows { rows: (0..count).collect(), time: None, before: None }),
+            None => Ok(Rows { rows: (0..count).collect(), time: None, rows_before: None }),
         };
     };
     if let Some(row) = times.iter().position(|time| !time.is_finite()) {
@@ -182,8 +182,8 @@ fn rows_at(
     };
     let at_time = |wanted: f64| (0..count).filter(move |row| times[*row] == wanted);
     let before = last_before(&|earlier| earlier < time);
-    let before = before.map(|earlier| at_time(earlier).count());
-    Ok(Rows { rows: at_time(time).collect(), time: Some(time), before })
+    let rows_before = before.map(|earlier| at_time(earlier).count());
+    Ok(Rows { rows: at_time(time).collect(), time: Some(time), rows_before })
 }
 
 #[cfg(test)]

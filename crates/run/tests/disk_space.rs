@@ -73,3 +73,28 @@ fn tables_and_probes_count() {
                   every = \"0.5 ms\"\n";
     compare(&format!("{WET}{output}"), 0.2);
 }
+
+#[test]
+fn a_landing_after_the_end_gives_no_files_at_events() {
+    let pair = "[[grain]]\nshape = { kind = \"sphere\", diameter = \"2 mm\" }\ndensity = 1500\n\
+                position = [\"4 mm\", \"4 mm\", \"9 mm\"]\n";
+    let stop = WET.replace("end = \"10 ms\"", "end = \"10 ms\"\nstop = \"landing\"");
+    compare(&format!("{stop}{pair}"), 0.1);
+}
+
+#[test]
+fn surfaces_of_many_grains_are_simplified() {
+    let mut text = String::from(
+        "gravity = [0, 0, 0]\n[domain]\nsize = [\"16 mm\", \"16 mm\", \"16 mm\"]\n\
+         [contact]\nstiffness = 200\n[time]\nstep = \"0.5 ms\"\nend = \"10 ms\"\n\
+         [output]\nsurfaces = \"5 ms\"\ntables = \"5 ms\"\n",
+    );
+    for place in 0..64 {
+        let [x, y, z] = [place % 4, place / 4 % 4, place / 16].map(|i| 2 + 4 * i);
+        text += &format!(
+            "[[grain]]\nshape = {{ kind = \"sphere\", diameter = \"3 mm\" }}\ndensity = 2500\n\
+             position = [\"{x} mm\", \"{y} mm\", \"{z} mm\"]\n"
+        );
+    }
+    compare(&text, 0.15);
+}

@@ -1,19 +1,19 @@
 //! Size of the files of a run before it starts, from the case.
 //!
-//! Tables and networks of contacts are left out. A pair counts as having four events besides its
-//! two landings.
+//! Tables and networks of contacts are left out. A pair that lands counts as having four events
+//! besides its two landings.
 
 use grainwake_formats::{diagnostics, grains, probes};
 use grainwake_shape::{Field, Shape};
 use grainwake_solver::grid::Mesh;
+use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{CELL_FIELDS, SAME_TIME, Setup};
 
 use super::scaled::ScaledColumns;
 use super::surfaces::{MAX_TRIANGLES, MERGED_CELLS};
 use crate::plan::{ProbePlace, RunPlan};
 
-/// Bytes of a number in a table with its separator: a double takes 16 to 17 digits, exponents and
-/// zeros included.
+/// Bytes of a number in a table with its separator, mean of the tables of the studies.
 const BYTES_PER_CELL: f64 = 18.5;
 /// Bytes of a point with its velocity and of a triangle with its grain in a file of surfaces.
 const BYTES_PER_POINT: f64 = 24.0;
@@ -21,24 +21,28 @@ const BYTES_PER_TRIANGLE: f64 = 20.0;
 /// Points of the surface of a sphere, as in `Shape::surface_mesh`.
 const SPHERE_POINTS: f64 = 3458.0;
 /// Points of a sampled surface over its area in squares of the grid (grains of the studies).
-const POINTS_PER_CELL: f64 = 1.8;
+const POINTS_PER_SQUARE: f64 = 1.8;
+/// Points of a simplified surface over its area in faces of the cubes (rocks 1.35, spheres 1.2).
+const MERGED_PER_SQUARE: f64 = 1.3;
 /// Numbers of the state per cell, ghosts included.
 const NUMBERS_PER_CELL: f64 = 7.0;
-/// Bytes of the state of a grain: pose, velocities, loads, and a contact.
-const BYTES_PER_GRAIN: f64 = 700.0;
+/// Bytes of the state of a grain with few contacts.
+const BYTES_PER_GRAIN: f64 = 350.0;
 
 /// Returns the size of the outputs of a run that ends at `end` [s], and of its grain files of
 /// `grain_files` bytes.
 pub fn output_bytes(setup: &Setup, plan: &RunPlan, end: f64, grain_files: usize) -> f64 {
     let periods = |interval: f64| (end / interval * (1.0 + SAME_TIME)).floor();
     let outputs = |interval: f64| if interval > 0.0 { periods(interval) + 1.0 } else { 0.0 };
+    // A landing that is not expected before the end does not stop the run.
+    let stops = plan.stop.is_some_and(|stop| stop.when != StopWhen::Landing || end < plan.end);
     // Slices and surfaces are also written at the last state unless a row of the tables is due,
-    // and at events, of which a run until something happens has some.
+    // and at events, of which a run that stops has some.
     let mut further = 0.0;
-    if plan.stop.is_some() || end > periods(plan.tables) * plan.tables * (1.0 + SAME_TIME) {
+    if stops || end > periods(plan.tables) * plan.tables * (1.0 + SAME_TIME) {
         further += 1.0;
     }
-    if plan.stop.is_some() && plan.at_events {
+    if stops && plan.at_events {
         further += match setup.grains.len() {
             1 => 1.0,
             2 => 6.0,
@@ -86,15 +90,17 @@ pub fn checkpoint_bytes(setup: &Setup, plan: &RunPlan) -> f64 {
 fn surface_bytes(setup: &Setup) -> f64 {
     let count = setup.grains.len();
     let points = |shape: &Shape| {
-        let cut = |edge: f64| POINTS_PER_CELL * shape.surface_area() / edge.powi(2);
+        let squares = |edge: f64| shape.surface_area() / edge.powi(2);
         let points = match shape.field() {
-            Field::Sampled(field) => cut(field.spacing()),
+            Field::Sampled(field) => POINTS_PER_SQUARE * squares(field.spacing()),
             _ => SPHERE_POINTS,
         };
         // A closed surface has twice as many triangles as points.
-        let merged = 2.0 * points * count as f64 > MAX_TRIANGLES as f64;
-        let coarse = cut(shape.equivalent_diameter() / MERGED_CELLS);
-        if merged { points.min(coarse) } else { points }
+        if 2.0 * points * count as f64 <= MAX_TRIANGLES as f64 {
+            return points;
+        }
+        let faces = squares(shape.equivalent_diameter() / MERGED_CELLS);
+        points.min(MERGED_PER_SQUARE * faces)
     };
     let all: f64 = setup.grains.iter().map(|grain| points(&grain.shape)).sum();
     all * (BYTES_PER_POINT + 2.0 * BYTES_PER_TRIANGLE)

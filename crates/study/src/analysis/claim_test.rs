@@ -229,8 +229,10 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     };
     let model = &reference.model;
     let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
-    let relative =
-        |o: &&Observation| relative_difference(last(o), reference.value, reference.value);
+    let relative = |o: &&Observation| match o.censored {
+        true => LAST,
+        false => relative_difference(o.value, reference.value, reference.value),
+    };
     let relative: Vec<f64> = others.iter().map(relative).collect();
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
     let largest = relative.iter().fold(0.0, larger);

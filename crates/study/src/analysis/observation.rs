@@ -25,8 +25,8 @@ pub struct Observation {
     pub durations: Vec<Duration>,
     /// Smallest and largest value over the ensemble.
     pub range: (f64, f64),
-    /// Whether the observation is right-censored: in half of the members or more, the pair landed,
-    /// or the run ended, before the event.
+    /// Whether the observation is right-censored: half of the members or more land, or end, before
+    /// the event.
     pub censored: bool,
 }
 

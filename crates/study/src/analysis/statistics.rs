@@ -95,7 +95,7 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
 fn order_p(x: &[f64], y: &[f64]) -> f64 {
     let middle = 0.5 * (x.len() as f64 + 1.0);
     let covariance = |y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - middle) * y).sum::<f64>().abs();
-    // Ranks are multiples of one half, so that sums of their products are exact to rounding.
+    // Different covariances of ranks differ by a quarter or more, equal ones by rounding only.
     let least = covariance(y) - 1e-6;
     let mut y = y.to_vec();
     let (mut as_far, mut orders) = (0.0, 0.0);
@@ -228,7 +228,7 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
     let largest = models.iter().map(Vec::len).max().unwrap_or(0);
     let mut sample = || {
-        // Places between the first and the last member, for models with fewer members too.
+        // Numbers of members as parts of their count, since models may have different counts.
         let places: Vec<f64> = (0..largest).map(|_| random.random()).collect();
         let drawn = |members: &Vec<f64>| {
             let place = |at: &f64| members[(at * members.len() as f64) as usize];
@@ -244,8 +244,9 @@ pub fn bootstrap_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     Some([quantile(&samples, 0.025)?, quantile(&samples, 0.975)?])
 }
 
-/// Returns the 95 % interval of the mean over models of the share of their members with an event,
-/// `outcomes` 0 or 1: that of Clopper and Pearson with models as units, for any sum of shares.
+/// Returns the 95 % interval of the mean over models of the share of their members with an event;
+/// a member is 1 with the event and 0 without. It is the interval of Clopper and Pearson with
+/// models as units and the sum of their shares as the number of events.
 pub fn share_interval(models: &[Vec<f64>]) -> Option<[f64; 2]> {
     let n = models.len() as f64;
     let events: f64 = models.iter().filter_map(|m| mean(m.iter().copied())).sum();
