@@ -30,6 +30,9 @@ TIME_TOLERANCE = 1e-3
 P_TOLERANCE = 1e-3
 DRAWS = 100_000
 TIMES = ["kiss_time", "contact_stage", "kissing_stage"]
+FACTORS = ["sphericity", "roundness", "krumbein_sphericity", "wadell_roundness"]
+# Number of groups of a factor that has more values than these.
+FEW, GROUPS = 6, 4
 # Stands for the time of an event that did not occur.
 LAST = 1e9
 
@@ -182,7 +185,7 @@ def observations(table, quantity, axes):
         table["kissed"] = table.parted.astype(float) != 0
     elif quantity == "kissing_stage":
         table["kissed"] = (table.parted.astype(float) != 0) | table.tumble_time.notna()
-    factors = [name for name in ("sphericity", "roundness") if name in table]
+    factors = [name for name in FACTORS if name in table]
     rows = []
     for model, every in table.groupby("model", sort=False):
         runs = every[every.value.notna()]
@@ -357,14 +360,26 @@ def check_claims(analysis, folder, axes):
     return checks
 
 
+def factor_groups(table, factor):
+    """Models in groups of ascending factor: one for each of few values, else of equal size."""
+    models = table.groupby("model", sort=False)[factor].first().dropna()
+    models = models.sort_values(kind="stable")
+    if models.nunique() <= FEW:
+        groups = [models[models == value] for value in models.unique()]
+    else:
+        ends = [i * len(models) // GROUPS for i in range(GROUPS + 1)]
+        groups = [models.iloc[low:high] for low, high in zip(ends, ends[1:])]
+    return [(group.mean(), table[table.model.isin(group.index)]) for group in groups]
+
+
 def check_factor_means(analysis, folder, by):
-    """Checks the means at the values of factors that have few values, and their intervals."""
+    """Checks the means over the models of groups of a factor, and their intervals."""
     table = pd.read_csv(folder / "table.csv")
     table = meets(table[table.state == "finished"], analysis.get("where", {}))
     checks = 0
     for entry in analysis["factor_means"]:
         quantity, factor = entry["quantity"], entry["factor"]
-        here = table[(table[by] == entry["level"]) & ((table[factor] - entry["at"]).abs() < 1e-9)]
+        here = table[table[by] == entry["level"]]
         if quantity == "kissing_share":
             values = here.kiss_time.notna().astype(float)
         else:
@@ -372,14 +387,17 @@ def check_factor_means(analysis, folder, by):
             if quantity == "contact_stage":
                 values = values.where(here.parted.astype(float) != 0)
         here = here.assign(value=values)[values.notna()]
-        groups = [g.value.to_numpy() for _, g in here.groupby("model")]
         what = f"{quantity} at {factor} {entry['at']} {entry['level']}"
+        here = [group for at, group in factor_groups(here, factor) if abs(at - entry["at"]) < 1e-9]
+        if len(here) != 1:
+            sys.exit(f"{what}: no such group by the second route")
+        groups = [g.value.to_numpy() for _, g in here[0].groupby("model")]
         close(f"{what}: models", float(len(groups)), entry["models"])
         close(f"{what}: mean", float(np.mean([g.mean() for g in groups])), entry["mean"], 1e-4)
         checks += 2
         if entry["interval"] is not None:
             # An end of the interval of few models is one of few values.
-            spread = here.value.max() - here.value.min()
+            spread = here[0].value.max() - here[0].value.min()
             share = quantity == "kissing_share"
             ends = share_interval(groups) if share else interval(groups)
             for end, expected in zip(ends, entry["interval"]):
