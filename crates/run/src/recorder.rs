@@ -255,26 +255,33 @@ impl Recorder {
 
     /// Writes the outputs of the last state, unless they have been written.
     pub fn finish(&mut self, sim: &Simulation) -> Result<(), RunError> {
-        if self.record.last_row != Some(sim.time()) {
-            self.append_rows(sim)?;
-            let slices = self.vtk.slices(&self.run, sim, "end")?;
-            let grains = self.vtk.grains(&self.run, sim, "end")?;
-            let mut files: Vec<Entry> = slices.into_iter().chain(grains).collect();
-            if self.series.iter().any(|s| s.content == Content::Contacts && s.is_on()) {
-                files.extend(contact_files(&self.run, sim, "end")?);
-            }
-            self.add(files)?;
-        }
+        let mut files = Vec::new();
         for index in 0..self.series.len() {
             let series = &self.series[index];
-            if let Content::Extra(table) = series.content
-                && series.is_on()
-                && self.record.last_extra_rows[table] != Some(sim.time())
-            {
-                self.append_extra(table, sim)?;
+            let wanted = series.is_on() || series.content == Content::Tables;
+            if wanted && !self.is_written(series.content, sim.time()) {
+                files.extend(self.write(series.content, sim, "end")?);
             }
         }
-        Ok(())
+        if files.is_empty() { Ok(()) } else { self.add(files) }
+    }
+
+    /// Returns whether the outputs of the last state, at `time` [s], are there.
+    fn is_written(&self, content: Content, time: f64) -> bool {
+        let record = &self.record;
+        let holds = |group: &str| {
+            let mut now = record.vtk_files.iter().rev().take_while(|entry| entry.time >= time);
+            now.any(|entry| entry.group.starts_with(group))
+        };
+        match content {
+            Content::Tables => record.last_row == Some(time),
+            Content::Extra(table) => record.last_extra_rows[table] == Some(time),
+            Content::Slices => holds("slice "),
+            Content::Surfaces => holds("grains"),
+            Content::Contacts => holds("contact"),
+            // Full fields are large; the last state is in the checkpoint.
+            Content::Fields => true,
+        }
     }
 
     /// Makes the VTK files and their index durable.

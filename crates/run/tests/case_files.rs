@@ -1006,6 +1006,17 @@ fn the_grid_is_refined_around_the_grains() {
     assert!(!coarse(&refined).contains("set refinement = 2"));
     let key = "domain.refinement";
     refused("[time]", "refinement = 3\n[time]", key, &["found 3", "2 halves"]);
+    let margin = |text: &str| PAIR.replace("[time]", &format!("refinement = 2\n{text}\n[time]"));
+    let wide = good(&margin("refinement_margin = [\"1 mm\", \"1 mm\", \"2 mm\"]"));
+    assert_eq!(wide.setup.refinement_margin, Some(DVec3::new(1e-3, 1e-3, 2e-3)));
+    // 8 cells across, 4 or 8 on each side and 2 of slack.
+    assert_eq!(wide.estimate(1).refined_cells, Some(36 * 36 * 96));
+    let key = "domain.refinement_margin";
+    let narrow = "refinement = 2\nrefinement_margin = \"0.5 mm\"\n[time]";
+    refused("[time]", narrow, key, &["found [0.5", "at least 3 cells", "0.75"]);
+    let alone = "refinement_margin = \"1 mm\"\n[time]";
+    refused("[time]", alone, key, &["without a refinement", "leave out"]);
+    let key = "domain.refinement";
     let paper = "refinement = 2\n[coupling]\nscheme = \"paper\"\n[time]";
     refused("[time]", paper, key, &["paper's scheme", "leave out"]);
     let flat = "size = [\"25 mm\", \"0.25 mm\", \"97.5 mm\"]\nrefinement = 2\n\

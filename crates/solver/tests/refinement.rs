@@ -304,6 +304,8 @@ fn set_ups_that_cannot_be_refined_are_refused() {
         Err(error) => error.to_string(),
     };
     assert!(message(case().with_refinement(3)).contains("1 or 2"));
+    let margin = case().with_refinement(2).with_refinement_margin(DVec3::new(0.3, 0.0, 0.3));
+    assert!(message(margin).contains("margin"));
     let paper = case().with_refinement(2).with_scheme(Scheme::Paper);
     assert!(message(paper).contains("one grid"));
     let mut flat = case().with_refinement(2).with_boundaries([WALLS, PERIODIC, WALLS]);

@@ -299,6 +299,32 @@ fn a_stop_rule_ends_a_run() {
 }
 
 #[test]
+fn the_last_state_is_written_once() {
+    let (folder, case) = folder_with(WET);
+    let files = |name: &str, set: &str| {
+        let out = folder.path().join(name);
+        let run = ["--quiet", "--set", set, "--set", "output.at_events=false"];
+        grainwake().arg("run").arg(&case).arg("-o").arg(&out).args(run).assert().success();
+        let names = |kind: &str| {
+            let files = std::fs::read_dir(out.join(kind)).unwrap().flatten();
+            let mut names: Vec<String> =
+                files.map(|file| file.file_name().into_string().unwrap()).collect();
+            names.sort();
+            names.retain(|name| name.starts_with("y-grain0") || name.starts_with("grains"));
+            names
+        };
+        let rows = std::fs::read_to_string(out.join("diagnostics.csv")).unwrap().lines().count();
+        (names("slices").pop().unwrap(), names("grains").pop().unwrap(), rows)
+    };
+    // A row of the tables is due at the end, a slice is not.
+    let end = ("y-grain0_end.vti".to_owned(), "grains_end.vtp".to_owned());
+    assert_eq!(files("row", "time.end=16 ms"), (end.0.clone(), end.1.clone(), 10));
+    assert_eq!(files("none", "time.end=15 ms"), (end.0, end.1, 10));
+    let due = ("y-grain0_000001.vti".to_owned(), "grains_000001.vtp".to_owned(), 7);
+    assert_eq!(files("both", "time.end=10 ms"), due);
+}
+
+#[test]
 fn schema_and_completions_are_printed() {
     let schema = grainwake().arg("schema").assert().success();
     assert_eq!(json(&schema.get_output().stdout)["title"], "Grainwake case file");

@@ -36,19 +36,18 @@ pub fn output_bytes(setup: &Setup, plan: &RunPlan, end: f64, grain_files: usize)
     let outputs = |interval: f64| if interval > 0.0 { periods(interval) + 1.0 } else { 0.0 };
     // A landing that is not expected before the end does not stop the run.
     let stops = plan.stop.is_some_and(|stop| stop.when != StopWhen::Landing || end < plan.end);
-    // Slices and surfaces are also written at the last state unless a row of the tables is due,
-    // and at events, of which a run that stops has some.
-    let mut further = 0.0;
-    if stops || end > periods(plan.tables) * plan.tables * (1.0 + SAME_TIME) {
-        further += 1.0;
-    }
-    if stops && plan.at_events {
-        further += match setup.grains.len() {
-            1 => 1.0,
-            2 => 6.0,
-            _ => 0.0,
-        };
-    }
+    // Slices and surfaces are also written at events, of which a run that stops has some. They are
+    // written at the last state, unless it is that of an event or another output.
+    let at_events = match setup.grains.len() {
+        1 if stops && plan.at_events => 1.0,
+        2 if stops && plan.at_events => 6.0,
+        _ => 0.0,
+    };
+    let is_between = |interval: f64| end > periods(interval) * interval * (1.0 + SAME_TIME);
+    let with_end = |interval: f64| {
+        let is_further = interval > 0.0 && at_events == 0.0 && (stops || is_between(interval));
+        outputs(interval) + at_events + if is_further { 1.0 } else { 0.0 }
+    };
     let grains = setup.grains.len() as f64;
     let row = |header: &str| {
         let header = ScaledColumns::of(header, plan.scales.as_ref()).header(header);
@@ -63,14 +62,14 @@ pub fn output_bytes(setup: &Setup, plan: &RunPlan, end: f64, grain_files: usize)
                 ProbePlace::Plane { .. } => row(probes::PLANE_HEADER),
             };
     }
-    bytes += (outputs(plan.surfaces) + further) * surface_bytes(setup);
+    bytes += with_end(plan.surfaces) * surface_bytes(setup);
     if setup.fluid.is_some() {
         let cells = setup.mesh.cells.map(|n| n as f64);
         let components: usize = CELL_FIELDS.iter().map(|field| field.components).sum();
         let per_cell = 4.0 * components as f64;
         let all = per_cell * cells.iter().product::<f64>();
         let slices: f64 = plan.planes.iter().map(|plane| all / cells[plane.axis]).sum();
-        bytes += outputs(plan.fields) * all + (outputs(plan.slices) + further) * slices;
+        bytes += outputs(plan.fields) * all + with_end(plan.slices) * slices;
     }
     bytes
 }

@@ -7,7 +7,7 @@ use grainwake_formats::codec::{Decoder, Encoder, invalid};
 
 use super::fields::AnyFieldView;
 use super::probe::{Probe, SampledGrid};
-use super::refinement;
+use super::refinement::{box_around, is_possible};
 use super::setup::Setup;
 use crate::dem::Grain;
 use crate::flow::{CoveredFace, Flow, FlowMeasures, FluidParams, NestedFlow, RefinedBox};
@@ -76,6 +76,8 @@ struct FluidOf<R> {
     measures: FlowMeasures,
     /// Grains when they were located last, if a refined box follows them.
     followed: Vec<Grain>,
+    /// Least distance from these grains to the sides of that box [m].
+    refinement_margin: Option<DVec3>,
 }
 
 impl<R: Real> FluidOf<R> {
@@ -99,7 +101,8 @@ impl<R: Real> FluidOf<R> {
         let mut grains =
             ImmersedGrains::new(flow.finest(), setup.scheme, density, nu, &setup.grains);
         let measures = grains.initialise(&mut flow, &mut setup.grains, setup.start);
-        FluidOf { flow, grains, measures, followed }
+        let refinement_margin = setup.refinement_margin;
+        FluidOf { flow, grains, measures, followed, refinement_margin }
     }
 
     /// Moves the refined box if it no longer holds the grains and their margins.
@@ -107,7 +110,8 @@ impl<R: Real> FluidOf<R> {
         let present @ Some(_) = self.flow.refined_box() else { return };
         let whole = &self.flow.whole;
         let (mesh, boundaries) = (whole.mesh(), whole.boundaries());
-        let place = refinement::box_around(mesh, boundaries, &self.followed, present);
+        let margin = self.refinement_margin;
+        let place = box_around(mesh, boundaries, &self.followed, margin, present);
         if let Some(place) = place.filter(|place| Some(*place) != present) {
             self.flow.refine(place);
             self.grains.move_to_grid(self.flow.finest(), &self.followed);
@@ -203,7 +207,7 @@ where
                 place.cells[axis] = input.u64()? as usize;
             }
             let whole = &self.flow.whole;
-            if !refinement::is_possible(whole.mesh(), whole.boundaries(), place) {
+            if !is_possible(whole.mesh(), whole.boundaries(), place) {
                 return Err(invalid(format!("the refined box {place:?} does not fit the grid")));
             }
             self.flow.refine(place);

@@ -39,6 +39,7 @@ pub use diagnostics::Diagnostics;
 pub use failure::{Remedy, RemedyTerms, StepError};
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
+pub use refinement::LEAST_REFINEMENT_MARGIN;
 pub use sample::{PlaneSample, PointSample};
 pub use setup::{Setup, SetupError, StepRule};
 pub use step::SAME_TIME;

@@ -7,11 +7,11 @@ use crate::flow::{Boundaries, RefinedBox};
 use crate::grid::Mesh;
 use crate::math::largest_prime_factor;
 
-/// Distance from the grains to the sides of the refined box, in diameters of the bounding sphere
-/// of the grain.
+/// Default distance from the grains to the sides of the refined box, in diameters of the bounding
+/// sphere of the grain.
 const MARGIN: f64 = 0.4;
 /// Least distance from the grains to the sides of the refined box [cells of the whole grid].
-const LEAST_MARGIN: f64 = 3.0;
+pub const LEAST_REFINEMENT_MARGIN: f64 = 3.0;
 /// Cells that a new box has beyond the margins, so that it moves less often.
 const SLACK: usize = 2;
 /// Largest number of cells that a box may have beyond those of a new one.
@@ -34,27 +34,28 @@ pub fn is_possible(mesh: &Mesh, boundaries: &Boundaries, place: RefinedBox) -> b
 
 /// Lower and upper end of what must be refined [cells from the lower corner of the box]; none if
 /// all grains have left.
-fn needed_range(mesh: &Mesh, grains: &[Grain]) -> Option<[DVec3; 2]> {
+fn needed_range(mesh: &Mesh, grains: &[Grain], margin: Option<DVec3>) -> Option<[DVec3; 2]> {
     let ranges = grains.iter().filter(|grain| !grain.has_left()).map(|grain| {
         let radius = grain.shape.bounding_radius();
-        let reach = DVec3::splat((1.0 + 2.0 * MARGIN) * radius) / mesh.spacing;
-        let reach = reach.max(radius / mesh.spacing + LEAST_MARGIN);
+        let margin = margin.unwrap_or(DVec3::splat(2.0 * MARGIN * radius)) / mesh.spacing;
+        let reach = radius / mesh.spacing + margin.max(DVec3::splat(LEAST_REFINEMENT_MARGIN));
         let centre = (grain.pose.position - mesh.origin) / mesh.spacing;
         [centre - reach, centre + reach]
     });
     ranges.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)])
 }
 
-/// Refined box around grains at their present poses; none if all have left. It is the `present` box
-/// along each axis where that holds the grains and is not far too large, else a new one with the
-/// grains in its middle.
+/// Refined box around grains at their present poses, with a `margin` [m] or the default one; none
+/// if all have left. It is the `present` box along each axis where that holds the grains and is not
+/// far too large, else a new one with the grains in its middle.
 pub fn box_around(
     mesh: &Mesh,
     boundaries: &Boundaries,
     grains: &[Grain],
+    margin: Option<DVec3>,
     present: Option<RefinedBox>,
 ) -> Option<RefinedBox> {
-    let [low, high] = needed_range(mesh, grains)?;
+    let [low, high] = needed_range(mesh, grains, margin)?;
     let mut result = RefinedBox { corner: [0; 3], cells: mesh.cells };
     for axis in 0..3 {
         let (n, periodic) = (mesh.cells[axis], boundaries.is_periodic(axis));
@@ -109,7 +110,7 @@ mod tests {
             .iter()
             .map(|x| Grain::new(shape.clone(), 1.5).with_position(DVec3::from_array(*x)))
             .collect();
-        box_around(&MESH, &Boundaries([[side; 2]; 3]), &grains, present).unwrap()
+        box_around(&MESH, &Boundaries([[side; 2]; 3]), &grains, None, present).unwrap()
     }
 
     #[test]

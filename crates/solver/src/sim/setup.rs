@@ -8,7 +8,8 @@ use crate::grid::Mesh;
 use crate::immersed::{Scheme, Start};
 use crate::math::Precision;
 
-use super::{Prescription, refinement};
+use super::Prescription;
+use super::refinement::box_around;
 
 /// Rule for the length of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,9 @@ pub struct Setup {
     /// Cells along the edge of a cell of the grid in a box around the grains, which moves with
     /// them: 1, the default, refines nothing; 2 halves the spacing there.
     pub refinement: usize,
+    /// Least distance from the grains to the sides of the refined box along x, y, z [m]. The
+    /// default is 0.4 diameters of their bounding spheres; three cells is the minimum.
+    pub refinement_margin: Option<DVec3>,
     /// Coupling scheme.
     pub scheme: Scheme,
     /// Start of grains that have a velocity relative to the fluid; by default impulsive.
@@ -90,6 +94,7 @@ impl Setup {
             fluid: None,
             precision: Precision::Double,
             refinement: 1,
+            refinement_margin: None,
             scheme: Scheme::default(),
             start: Start::default(),
             gravity: DVec3::ZERO,
@@ -117,6 +122,11 @@ impl Setup {
     /// Replaces the refinement around the grains, 1 or 2.
     pub fn with_refinement(mut self, refinement: usize) -> Setup {
         self.refinement = refinement;
+        self
+    }
+    /// Replaces the least distance from the grains to the sides of the refined box [m].
+    pub fn with_refinement_margin(mut self, margin: impl Into<Option<DVec3>>) -> Setup {
+        self.refinement_margin = margin.into();
         self
     }
     /// Replaces the coupling scheme.
@@ -163,7 +173,8 @@ impl Setup {
     /// Refined box around the present grains, if the set-up has one.
     pub(super) fn refined_box(&self) -> Option<RefinedBox> {
         let is_refined = self.refinement > 1 && self.fluid.is_some();
-        let place = || refinement::box_around(&self.mesh, &self.boundaries, &self.grains, None);
+        let margin = self.refinement_margin;
+        let place = || box_around(&self.mesh, &self.boundaries, &self.grains, margin, None);
         is_refined.then(place).flatten()
     }
 
@@ -238,6 +249,10 @@ impl Setup {
             } else if flat {
                 return fail("a box with a flat axis cannot be refined".into());
             }
+        }
+        if self.refinement_margin.is_some_and(|margin| !margin.to_array().into_iter().all(bounded))
+        {
+            return fail("the margin of the refined box must be positive".into());
         }
         let motions = &self.prescription.motions;
         if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {

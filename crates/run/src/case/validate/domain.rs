@@ -12,6 +12,7 @@ use crate::number_format::{AXES, length, number, quantity, vector};
 use grainwake_solver::flow::{Boundaries, Boundary};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::immersed::Scheme;
+use grainwake_solver::sim::LEAST_REFINEMENT_MARGIN;
 
 /// Largest number of cells along an axis; more suggest a forgotten unit.
 const MOST_CELLS: usize = 1 << 20;
@@ -162,6 +163,30 @@ pub(super) fn refinement(
         }
     }
     refinement.value
+}
+
+/// Returns the margin [m] of the refined box of a case, whose refinement is given.
+pub(super) fn refinement_margin(
+    check: &mut Checker,
+    raw: &RawDomain,
+    refinement: usize,
+    mesh: &Mesh,
+) -> Option<DVec3> {
+    let margin = raw.refinement_margin.as_ref()?;
+    if refinement == 1 {
+        let help = "leave out refinement_margin, or set refinement = 2";
+        return check.refuse(&margin.span, "without a refinement there is no margin", help);
+    }
+    let least = LEAST_REFINEMENT_MARGIN * mesh.spacing;
+    if margin.0.cmplt(least).any() {
+        let message = format!("found {}", vector(margin.0, "m"));
+        let help = format!(
+            "the refined box needs at least {LEAST_REFINEMENT_MARGIN} cells beside the grains: {}",
+            vector(least, "m")
+        );
+        return check.refuse(&margin.span, message, &help);
+    }
+    Some(margin.0)
 }
 
 /// Positions in the source of the conditions on the six faces.

@@ -131,6 +131,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     };
     let state = [dry, grains.is_empty()];
     let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, state);
+    let margin = domain::refinement_margin(check, &raw.domain, refinement, &mesh);
     let spacing = mesh.spacing / refinement.max(1) as f64;
     let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, dry);
     let setup = Setup::new(mesh)
@@ -138,6 +139,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
         .with_fluid(fluid)
         .with_precision(raw.run.precision.value)
         .with_refinement(refinement)
+        .with_refinement_margin(margin)
         .with_scheme(raw.coupling.scheme.value)
         .with_start(raw.coupling.start.value)
         .with_gravity(gravity)
