@@ -149,6 +149,9 @@ impl PyCase {
     ///     Edge of a cell [m].
     /// refinement : int, optional
     ///     2 halves the cells in a box that follows the grains; 1 by default.
+    /// refinement_margin : float, str or sequence, optional
+    ///     Least distance from the grains to the sides of that box [m], one or one per axis; 0.4
+    ///     diameters by default.
     /// end : float or str
     ///     End of the run [s].
     /// grains : sequence of dict, default ()
@@ -172,13 +175,14 @@ impl PyCase {
     /// -------
     /// Case
     #[staticmethod]
-    #[pyo3(signature = (*, size, cell_size, end, refinement = None, grains = None, fluid = None, gravity = None, boundaries = None, title = None, folder = PathBuf::from("."), **tables))]
+    #[pyo3(signature = (*, size, cell_size, end, refinement = None, refinement_margin = None, grains = None, fluid = None, gravity = None, boundaries = None, title = None, folder = PathBuf::from("."), **tables))]
     fn new(
         py: Python<'_>,
         size: &Bound<'_, PyAny>,
         cell_size: &Bound<'_, PyAny>,
         end: &Bound<'_, PyAny>,
         refinement: Option<usize>,
+        refinement_margin: Option<&Bound<'_, PyAny>>,
         grains: Option<&Bound<'_, PyAny>>,
         fluid: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
@@ -191,6 +195,7 @@ impl PyCase {
         domain.set_item("size", size)?;
         domain.set_item("cell_size", cell_size)?;
         domain.set_item("refinement", refinement)?;
+        domain.set_item("refinement_margin", refinement_margin)?;
         domain.set_item("boundaries", boundaries)?;
         let time = PyDict::new(py);
         time.set_item("end", end)?;

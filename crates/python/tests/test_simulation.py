@@ -46,6 +46,10 @@ def test_a_refined_box_follows_a_grain(case_file):
                     fluid={"density": 1, "viscosity": 0.1},
                     grains=[gw.Grain.sphere(0.5).at([0.5, 0.5, 1], density=2)])
     assert "refinement = 2" in gw.Case.new(refinement=2, **keywords).resolved
+    wide = gw.Case.new(refinement=2, refinement_margin=[0.4, 0.4, 0.5], **keywords)
+    assert "refinement_margin = [0.4, 0.4, 0.5]" in wide.resolved
+    with pytest.raises(gw.CaseError, match="at least 3 cells"):
+        gw.Case.new(refinement=2, refinement_margin=0.1, **keywords)
     with pytest.raises(gw.CaseError, match="found 3"):
         gw.Case.new(refinement=3, **keywords)
 

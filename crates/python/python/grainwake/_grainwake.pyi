@@ -234,6 +234,7 @@ class Case:
         cell_size: _Quantity | _Vector,
         end: _Quantity,
         refinement: int | None = None,
+        refinement_margin: _Quantity | _Vector | None = None,
         grains: Sequence[Mapping[str, Any]] | None = None,
         fluid: Mapping[str, Any] | None = None,
         gravity: _Vector | None = None,
