@@ -52,7 +52,7 @@ cargo build --release --quiet
 
 # 4. Statistics of the study by a second route.
 "$work/full/bin/pip" install -q lifelines
-for study in ensemble members; do
-  "$work/full/bin/python" studies/second_route.py "results/dkt-morphology-$study" orientation cells
+for study in dkt-morphology-ensemble dkt-morphology-members dkt-real-grains; do
+  "$work/full/bin/python" studies/second_route.py "results/$study" orientation cells
 done
 echo "python: all checks passed in $((SECONDS - started)) s"

@@ -24,6 +24,8 @@ from scipy import stats
 
 SAMPLES = 4000
 INTERVAL_TOLERANCE = 0.02
+# Of 0.025, the part of the samples beyond an end of an interval.
+RANK_TOLERANCE = 0.012
 # table.csv has six digits.
 TIME_TOLERANCE = 1e-3
 # Of counted p values, relative; drawn ones scatter with the number of draws.
@@ -45,8 +47,8 @@ def read(folder, by):
     return table
 
 
-def interval(groups, seed=1):
-    """95 % interval of the mean over models of the mean over members.
+def bootstrap(groups, seed=1):
+    """Samples of the mean over models of the mean over members.
 
     Models are drawn anew, and numbers of members once for all models.
     """
@@ -58,7 +60,22 @@ def interval(groups, seed=1):
         at = random.random(largest)
         drawn = [(at[: len(group)] * len(group)).astype(int) for group in groups]
         samples[i] = np.mean([groups[m][drawn[m]].mean() for m in models])
-    return np.quantile(samples, [0.025, 0.975])
+    return samples
+
+
+def interval(groups):
+    """95 % interval of the mean over models of the mean over members."""
+    return np.quantile(bootstrap(groups), [0.025, 0.975])
+
+
+def close_ends(what, groups, expected):
+    """Checks the ends of a 95 % interval of a bootstrap by the parts of the samples beyond them."""
+    samples = bootstrap(groups)
+    size = TIME_TOLERANCE * max(1.0, np.abs(samples).max())
+    for sign, end in zip((1, -1), expected):
+        beyond = [np.mean(sign * (samples - end) < shift) for shift in (-size, size)]
+        if beyond[0] > 0.025 + RANK_TOLERANCE or beyond[1] < 0.025 - RANK_TOLERANCE:
+            sys.exit(f"{what}: {end} in analysis.json has {beyond} of the samples beyond it")
 
 
 def share_interval(groups):
@@ -396,12 +413,11 @@ def check_factor_means(analysis, folder, by):
         close(f"{what}: mean", float(np.mean([g.mean() for g in groups])), entry["mean"], 1e-4)
         checks += 2
         if entry["interval"] is not None:
-            # An end of the interval of few models is one of few values.
-            spread = here[0].value.max() - here[0].value.min()
-            share = quantity == "kissing_share"
-            ends = share_interval(groups) if share else interval(groups)
-            for end, expected in zip(ends, entry["interval"]):
-                close(f"{what}: interval", end, expected, 0.1 * spread + 1e-4)
+            if quantity == "kissing_share":
+                for end, expected in zip(share_interval(groups), entry["interval"]):
+                    close(f"{what}: interval", end, expected, 1e-6)
+            else:
+                close_ends(f"{what}: interval", groups, entry["interval"])
             checks += 2
     return checks
 
