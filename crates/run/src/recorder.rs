@@ -12,12 +12,14 @@ use crate::contact_events::{MAX_GRAINS, WallEvents};
 use crate::error::{Context, RunError};
 use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
-use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files};
+use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files, remove_if_there};
 use crate::series::{self, Content, Series};
 use crate::watch::Watch;
 
 /// Index of the VTK files.
 const INDEX: &str = "run.pvd";
+/// End of the names of the VTK files of the last state.
+const LAST: &str = "end";
 
 /// Recorder of a run: tables, VTK files, events, checkpoints.
 pub(crate) struct Recorder {
@@ -146,6 +148,14 @@ impl Recorder {
         if !recorder.with_walls {
             record.wall_events = WallEvents::default();
         }
+        // A finished run that goes on ends later; its earlier end is an output of no series.
+        let is_last = |entry: &mut Entry| {
+            let stem = entry.file.rsplit_once('.').map_or("", |(stem, _)| stem);
+            stem.strip_suffix(LAST).is_some_and(|stem| stem.ends_with('_'))
+        };
+        for entry in record.vtk_files.extract_if(.., is_last) {
+            remove_if_there(&run.join(&entry.file), disk::remove_file)?;
+        }
         recorder.synced_vtk_files = record.vtk_files.len();
         recorder.record = record;
         recorder.write_collection()?;
@@ -260,7 +270,7 @@ impl Recorder {
             let series = &self.series[index];
             let wanted = series.is_on() || series.content == Content::Tables;
             if wanted && !self.is_written(series.content, sim.time()) {
-                files.extend(self.write(series.content, sim, "end")?);
+                files.extend(self.write(series.content, sim, LAST)?);
             }
         }
         if files.is_empty() { Ok(()) } else { self.add(files) }

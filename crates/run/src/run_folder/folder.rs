@@ -178,21 +178,25 @@ pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // An interrupted removal can be repeated: the summary, which marks a finished run, goes first,
     // then the checkpoints, which refer to the other files. The provenance marks a run folder and
     // goes last.
-    remove(&folder.join(summary::FILE), disk::remove_file)?;
-    remove(&folder.join(checkpoint::FOLDER), disk::remove_folder)?;
+    remove_if_there(&folder.join(summary::FILE), disk::remove_file)?;
+    remove_if_there(&folder.join(checkpoint::FOLDER), disk::remove_folder)?;
     let files =
         [contacts::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
     let folders = [probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
-        remove(&folder.join(name), disk::remove_folder)?;
+        remove_if_there(&folder.join(name), disk::remove_folder)?;
     }
     for name in tables::FILES.into_iter().chain(files) {
-        remove(&folder.join(name), disk::remove_file)?;
+        remove_if_there(&folder.join(name), disk::remove_file)?;
     }
     Ok(())
 }
 
-fn remove(path: &Path, how: impl Fn(&Path) -> std::io::Result<()>) -> Result<(), RunError> {
+/// Removes a file or folder, which may be gone already.
+pub(crate) fn remove_if_there(
+    path: &Path,
+    how: impl Fn(&Path) -> std::io::Result<()>,
+) -> Result<(), RunError> {
     match how(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
             Err(error).context("remove", path)

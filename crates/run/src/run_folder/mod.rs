@@ -21,7 +21,8 @@ pub use parent::Parent;
 pub(crate) use compare::differing;
 pub(crate) use extra::ExtraTable;
 pub(crate) use folder::{
-    Content, admit, admit_parent, clear, create, lock_folder, same_parent, start_lost,
+    Content, admit, admit_parent, clear, create, lock_folder, remove_if_there, same_parent,
+    start_lost,
 };
 pub(crate) use size::{checkpoint_bytes, output_bytes};
 pub(crate) use tables::Tables;
