@@ -148,7 +148,7 @@ impl Recorder {
         if !recorder.with_walls {
             record.wall_events = WallEvents::default();
         }
-        // A finished run that goes on ends later; its earlier end is an output of no series.
+        // A finished run that goes on has files of its earlier end, which belong to no series.
         let is_last = |entry: &mut Entry| {
             let stem = entry.file.rsplit_once('.').map_or("", |(stem, _)| stem);
             stem.strip_suffix(LAST).is_some_and(|stem| stem.ends_with('_'))

@@ -69,6 +69,25 @@ fn motion_in_a_refined_box_is_that_of_the_fine_grid() {
 }
 
 #[test]
+fn the_margin_is_kept_while_the_box_follows_a_grain() {
+    // Sizes of the state with the fields of the box, at the start and after a fall of 2 diameters.
+    let sizes = |margin: Option<DVec3>| {
+        let case = setup([3, 3, 9], 6, 0.02, vec![sphere(2.0, [1.5, 1.5, 6.0])]).with_refinement(2);
+        let mut sim = Simulation::new(case.with_refinement_margin(margin)).unwrap();
+        let start = bits(&sim).len() as f64;
+        while sim.grains()[0].pose.position.z > 4.0 {
+            step(&mut sim);
+        }
+        (start, bits(&sim).len() as f64)
+    };
+    let (default, wide) = (sizes(None), sizes(Some(DVec3::new(0.5, 0.5, 1.5))));
+    println!("{default:?} and {wide:?} bytes");
+    // 54 cells along z instead of 30.
+    assert!(wide.0 > 1.2 * default.0);
+    assert!((wide.1 / wide.0 - 1.0).abs() < 0.02);
+}
+
+#[test]
 fn a_grain_carried_by_a_uniform_stream_feels_no_force() {
     // The box follows the grain across all periodic sides.
     let stream = DVec3::new(1.0, 0.6, -0.8);

@@ -36,8 +36,8 @@ pub fn output_bytes(setup: &Setup, plan: &RunPlan, end: f64, grain_files: usize)
     let outputs = |interval: f64| if interval > 0.0 { periods(interval) + 1.0 } else { 0.0 };
     // A landing that is not expected before the end does not stop the run.
     let stops = plan.stop.is_some_and(|stop| stop.when != StopWhen::Landing || end < plan.end);
-    // Slices and surfaces are also written at events, of which a run that stops has some. They are
-    // written at the last state, unless it is that of an event or another output.
+    // Slices and surfaces are also written at events, of which a run that stops has some, and at
+    // the last state, unless it is that of another output.
     let at_events = match setup.grains.len() {
         1 if stops && plan.at_events => 1.0,
         2 if stops && plan.at_events => 6.0,
@@ -45,7 +45,7 @@ pub fn output_bytes(setup: &Setup, plan: &RunPlan, end: f64, grain_files: usize)
     };
     let is_between = |interval: f64| end > periods(interval) * interval * (1.0 + SAME_TIME);
     let with_end = |interval: f64| {
-        let is_further = interval > 0.0 && at_events == 0.0 && (stops || is_between(interval));
+        let is_further = interval > 0.0 && (stops || is_between(interval));
         outputs(interval) + at_events + if is_further { 1.0 } else { 0.0 }
     };
     let grains = setup.grains.len() as f64;

@@ -25,8 +25,8 @@ pub struct Observation {
     pub durations: Vec<Duration>,
     /// Smallest and largest value over the ensemble.
     pub range: (f64, f64),
-    /// Whether the observation is right-censored: half of the members or more land, or end, before
-    /// the event.
+    /// Whether the observation is right-censored: in at least half of the members the event has not
+    /// occurred when the pair lands or the run ends.
     pub censored: bool,
 }
 
