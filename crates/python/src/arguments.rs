@@ -1,7 +1,7 @@
 //! Arguments from Python: numbers with units, vectors and arrays.
 
 use glam::DVec3;
-use grainwake_run::case::quantity::{Kind, parse_quantity};
+use grainwake_run::case::quantity::{Kind, parse_quantity, without_unit};
 use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyString};
@@ -42,8 +42,9 @@ pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> 
         false => value.extract::<f64>().map_err(drop),
     };
     match number {
-        Ok(number) if number.is_finite() => Ok(number),
-        Ok(number) => Err(input(format!("{name}: found {number}; expected {}", K::EXPECTED))),
+        Ok(number) => {
+            without_unit::<K>(number).map_err(|message| input(format!("{name}: {message}")))
+        }
         Err(()) => {
             let found = value.get_type().name()?;
             Err(input(format!("{name}: found a value of type {found}; expected {}", K::EXPECTED)))

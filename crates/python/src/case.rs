@@ -207,7 +207,16 @@ impl PyCase {
         all.set_item("grain", grains)?;
         for (name, table) in tables.into_iter().flatten() {
             match name.cast::<PyString>()?.to_str()? {
+                "domain" => {
+                    let message = "domain: its keys are arguments of their own, such as size; a \
+                                   case with other keys is made by from_dict";
+                    return Err(input(message));
+                }
+                "grain" if grains.is_some() => return Err(input("grain: given beside grains")),
                 "time" => match table.cast::<PyDict>() {
+                    Ok(more) if more.contains("end")? => {
+                        return Err(input("time.end: given beside the argument end"));
+                    }
                     Ok(more) => time.update(more.as_mapping())?,
                     Err(_) => {
                         let found = table.get_type().name()?;
@@ -282,7 +291,7 @@ impl PyCase {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let threads = threads::resolve(py, threads.map_or(self.case.threads, usize::from))?;
-        let existing = running::existing(resume, force);
+        let existing = running::existing(resume, force)?;
         let parent = start_from.map(|text| running::parent(py, &self.case, &text)).transpose()?;
         running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
         if report {

@@ -9,6 +9,9 @@ use toml::{Table, Value};
 use crate::error::{Raise, input, system};
 use crate::grain::PyGrain;
 
+/// Largest number of tables and lists inside each other.
+const DEEPEST: usize = 32;
+
 /// Returns overrides as strings in the syntax of `Case::load`; None removes a key.
 pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<String>> {
     let Some(overrides) = overrides else {
@@ -60,6 +63,13 @@ fn value(path: &str, given: &Bound<'_, PyAny>, store: Option<&Path>) -> PyResult
     if given.is_none() {
         return Ok(None);
     }
+    if path.matches('.').count() > DEEPEST {
+        let start: Vec<&str> = path.split('.').take(3).collect();
+        let start = start.join(".");
+        return Err(input(format!(
+            "{start}...: more than {DEEPEST} lists or dicts inside each other"
+        )));
+    }
     if given.is_instance_of::<PyBool>() {
         return Ok(Some(Value::Boolean(given.extract()?)));
     }
@@ -84,7 +94,10 @@ fn value(path: &str, given: &Bound<'_, PyAny>, store: Option<&Path>) -> PyResult
     }
     if given.hasattr("tolist")? {
         // NumPy numbers and arrays.
-        return value(path, &given.call_method0("tolist")?, store);
+        let plain = given.call_method0("tolist")?;
+        if !plain.hasattr("tolist")? {
+            return value(path, &plain, store);
+        }
     }
     if let Ok(mapping) = given.cast::<PyMapping>() {
         return Ok(Some(Value::Table(table(path, mapping, store)?)));

@@ -16,18 +16,21 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{Raise, numerics, warn};
+use crate::error::{Raise, input, numerics, warn};
 use crate::threads;
 
 /// Interval at which signals are handled and the progress is shown.
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Returns the treatment of a run in the folder.
-pub fn existing(resume: bool, force: bool) -> Existing {
+pub fn existing(resume: bool, force: bool) -> PyResult<Existing> {
     match (resume, force) {
-        (true, _) => Existing::Resume,
-        (_, true) => Existing::Replace,
-        _ => Existing::Refuse,
+        (true, true) => {
+            Err(input("resume continues a run and force replaces it: give one of them"))
+        }
+        (true, _) => Ok(Existing::Resume),
+        (_, true) => Ok(Existing::Replace),
+        _ => Ok(Existing::Refuse),
     }
 }
 

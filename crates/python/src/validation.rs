@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use grainwake_run::Existing;
 use grainwake_run::case::Case;
-use grainwake_validation::{Level, Library, Suite};
+use grainwake_validation::{Level, Library};
 use pyo3::prelude::*;
 
 use crate::arrays::json;
@@ -32,7 +32,7 @@ pub fn _validate<'py>(
         }
     };
     let library = Library::open(suites.as_deref()).raise()?;
-    let suites = chosen(library.suites.clone(), &names)?;
+    let suites = library.chosen(&names).raise()?;
     let threads = threads::resolve(py, threads)?;
     let mut results = Vec::new();
     for suite in &suites {
@@ -52,30 +52,4 @@ pub fn _validate<'py>(
         }
     }
     json(py, &results)
-}
-
-/// Returns the suites and runs with the given names, NAME or NAME/RUN; all without names.
-fn chosen(all: Vec<Suite>, names: &[String]) -> PyResult<Vec<Suite>> {
-    let absent = |what: String, known: Vec<&str>| {
-        Err(input(format!("{what}; there are: {}", known.join(", "))))
-    };
-    for name in names {
-        let (suite_name, run) = name.split_once('/').unwrap_or((name, ""));
-        let Some(suite) = all.iter().find(|suite| suite.name == suite_name) else {
-            let known = all.iter().map(|suite| suite.name.as_str()).collect();
-            return absent(format!("there is no validation \"{suite_name}\""), known);
-        };
-        if !run.is_empty() && suite.runs.iter().all(|known| known.name != run) {
-            let known = suite.runs.iter().map(|run| run.name.as_str()).collect();
-            return absent(format!("the validation \"{suite_name}\" has no run \"{run}\""), known);
-        }
-    }
-    let wanted = |suite: Suite| {
-        if names.is_empty() || names.contains(&suite.name) {
-            return suite;
-        }
-        let name = suite.name.clone();
-        suite.restricted_to(|run| names.contains(&format!("{name}/{run}")))
-    };
-    Ok(all.into_iter().map(wanted).collect())
 }

@@ -73,6 +73,9 @@ impl Opened {
         let summary = Summary::read(&self.out).context("read", &file)?;
         let (from, to) = (summary.end_time_s, job.plan.end);
         if from >= to * (1.0 - SAME_TIME) || summary.ended_by != EndReason::End {
+            if from > to * (1.0 + SAME_TIME) && summary.ended_by == EndReason::End {
+                note(&format!("the run went on to t = {from} s; an end at {to} s changes nothing"));
+            }
             return Ok(Some(summary));
         }
         note(&format!("the run had ended at t = {from} s; going on to {to} s"));

@@ -65,18 +65,42 @@ pub(crate) struct Body<D> {
 }
 
 impl ShapeOptions {
-    fn spacing(&self, extent: DVec3) -> Result<f64> {
+    /// Refuses a resolution that no shape can have.
+    pub(crate) fn check(&self) -> Result<()> {
         let cells = self.cells.unwrap_or(DEFAULT_CELLS);
         for (name, value) in [("cells", cells), ("least_cells", self.least_cells)] {
             within(name, value as f64, 8.0..=1024.0, "must be 8 to 1024")?;
         }
-        if let Some(nodes) = self.nodes {
-            within("nodes", nodes as f64, 16.0..=1e6, "must be 16 to 1000000")?;
-        }
+        self.nodes.map_or(Ok(()), |nodes| {
+            within("nodes", nodes as f64, 16.0..=1e6, "must be 16 to 1000000")
+        })
+    }
+
+    fn spacing(&self, extent: DVec3) -> Result<f64> {
+        self.check()?;
+        let cells = self.cells.unwrap_or(DEFAULT_CELLS);
         positive("shortest extent of the body", extent.min_element())?;
         size("longest extent of the body", extent.max_element())?;
-        Ok((extent.max_element() / cells as f64)
-            .min(extent.min_element() / self.least_cells as f64))
+        Ok((extent.max_element() / cells as f64).min(self.thinnest_spacing(extent)))
+    }
+
+    /// Largest spacing [m] with the least number of cells across the thinnest extent.
+    fn thinnest_spacing(&self, extent: DVec3) -> f64 {
+        extent.min_element() / self.least_cells as f64
+    }
+
+    /// Error of a body with too many samples, if its thinnest extent asks for them.
+    fn too_thin(&self, extent: DVec3) -> Option<ShapeError> {
+        let cells = self.cells.unwrap_or(DEFAULT_CELLS);
+        let ratio = extent.max_element() / extent.min_element();
+        (self.thinnest_spacing(extent) < extent.max_element() / cells as f64).then(|| {
+            let reason = format!(
+                "too flat or too long; {} cells across its thinnest extent need too many samples, \
+                 make it thicker",
+                self.least_cells
+            );
+            ShapeError::parameter("longest over thinnest extent of the body", ratio, &reason)
+        })
     }
 }
 
@@ -90,7 +114,8 @@ pub(crate) fn assemble<D: Distance>(
     let extent = body.upper - body.lower;
     let spacing = options.spacing(extent)?;
     let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
-    let mut field = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin)?;
+    let sampled = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin);
+    let mut field = sampled.map_err(|error| options.too_thin(extent).unwrap_or(error))?;
     let scanned = matches!(body.surface, roundness::Surface::Scanned { .. });
     let removed = specks::remove(&mut field, scanned);
     if removed > 0.0 {

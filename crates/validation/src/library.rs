@@ -4,6 +4,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use flate2::read::DeflateDecoder;
+use grainwake_run::case::{Problem, did_you_mean};
 use tempfile::TempDir;
 
 use crate::suite::{Suite, SuiteError};
@@ -20,8 +21,8 @@ const FOLDER: &str = "validation";
 pub struct Library {
     /// Suites in order of name. Their files exist as long as the library.
     pub suites: Vec<Suite>,
-    /// Copy of the files in the program.
-    unpacked: Option<TempDir>,
+    /// Copy of the files in the program, removed with the library.
+    _unpacked: Option<TempDir>,
 }
 
 impl Library {
@@ -32,11 +33,15 @@ impl Library {
     /// An unreadable folder, or the first invalid suite.
     pub fn open(folder: Option<&Path>) -> Result<Library, SuiteError> {
         if let Some(folder) = folder {
-            return Ok(Library { suites: Suite::read_all(folder)?, unpacked: None });
+            return Ok(Library { suites: Suite::read_all(folder)?, _unpacked: None });
         }
         let tree = Path::new(FOLDER);
         let suites = if tree.is_dir() { Suite::read_all(tree)? } else { Vec::new() };
-        if suites.is_empty() { Library::embedded() } else { Ok(Library { suites, unpacked: None }) }
+        if suites.is_empty() {
+            Library::embedded()
+        } else {
+            Ok(Library { suites, _unpacked: None })
+        }
     }
 
     /// Reads the suites in the program. A temporary folder holds their files.
@@ -63,13 +68,52 @@ impl Library {
             std::fs::create_dir_all(folder).map_err(failed(folder))?;
             std::fs::write(&path, file).map_err(failed(&path))?;
         }
-        Ok(Library { suites: Suite::read_all(unpacked.path())?, unpacked: Some(unpacked) })
+        Ok(Library { suites: Suite::read_all(unpacked.path())?, _unpacked: Some(unpacked) })
     }
 
-    /// Returns whether the suites are those in the program.
-    pub fn is_embedded(&self) -> bool {
-        self.unpacked.is_some()
+    /// Returns the suites and runs with the given names, NAME or NAME/RUN, with the runs that these
+    /// refer to; all without names.
+    ///
+    /// # Errors
+    /// There are no suites, or a name is not known; the remedy lists the known ones.
+    pub fn chosen(&self, names: &[String]) -> Result<Vec<Suite>, SuiteError> {
+        if self.suites.is_empty() {
+            let message = "there is no validation in the folder of the suites";
+            let help =
+                "each is a folder with a validation.toml; suites is the folder that holds them";
+            return Err(Problem::new(message).help(help).into());
+        }
+        for name in names {
+            let (suite_name, run) = match name.split_once('/') {
+                Some((suite, run)) => (suite, Some(run)),
+                None => (name.as_str(), None),
+            };
+            let known = self.suites.iter().map(|suite| suite.name.as_str());
+            let Some(suite) = self.suites.iter().find(|suite| suite.name == suite_name) else {
+                let message = format!("there is no validation \"{suite_name}\"");
+                return Err(unknown(message, suite_name, "There are", known.collect()));
+            };
+            let runs = suite.runs.iter().map(|run| run.name.as_str());
+            if let Some(run) = run.filter(|run| !runs.clone().any(|known| known == *run)) {
+                let message = format!("the validation \"{suite_name}\" has no run \"{run}\"");
+                return Err(unknown(message, run, "It has", runs.collect()));
+            }
+        }
+        let chosen = self.suites.iter().cloned().map(|suite| {
+            if names.is_empty() || names.contains(&suite.name) {
+                return suite;
+            }
+            let name = suite.name.clone();
+            suite.restricted_to(|run| names.contains(&format!("{name}/{run}")))
+        });
+        Ok(chosen.filter(|suite| !suite.runs.is_empty()).collect())
     }
+}
+
+/// Problem of an unknown `word`; `listed` introduces the `known` ones.
+fn unknown(message: String, word: &str, listed: &str, known: Vec<&str>) -> SuiteError {
+    let hint = did_you_mean(word, known.iter().copied());
+    Problem::new(message).help(format!("{hint}{listed}: {}", known.join(", "))).into()
 }
 
 #[cfg(test)]
@@ -83,7 +127,7 @@ mod tests {
             suites.iter().map(|s| (s.name.clone(), s.title.clone(), s.runs.len())).collect()
         };
         let embedded = Library::embedded().unwrap();
-        let unpacked = embedded.unpacked.as_ref().unwrap().path();
+        let unpacked = embedded._unpacked.as_ref().unwrap().path();
         let explains =
             |path: &Path| ["md", "py"].iter().any(|e| path.extension() == Some(e.as_ref()));
         for suite in std::fs::read_dir(&tree).unwrap().flatten().filter(|e| e.path().is_dir()) {
@@ -103,10 +147,40 @@ mod tests {
             describe(&Library::open(Some(&tree)).unwrap().suites)
         );
         assert!(embedded.suites.iter().any(|suite| suite.name == "ten-cate"));
-        let folder = embedded.unpacked.as_ref().unwrap().path().to_path_buf();
+        let folder = embedded._unpacked.as_ref().unwrap().path().to_path_buf();
         assert!(embedded.suites[0].folder.starts_with(&folder) && folder.is_dir());
         drop(embedded);
         assert!(!folder.exists(), "the temporary folder is removed");
+    }
+
+    #[test]
+    fn names_choose_suites_and_runs_with_their_references() {
+        let library = Library::embedded().unwrap();
+        let chosen = |name: &str| library.chosen(&[name.to_string()]);
+        let all = library.chosen(&[]).unwrap();
+        assert_eq!(describe_runs(&all), describe_runs(&library.suites));
+        let rotation = chosen("rotation").unwrap();
+        assert!(rotation.len() == 1 && rotation[0].runs.len() > 1);
+        let run = chosen("rotation/spin-d8").unwrap();
+        assert!(run[0].runs.len() < rotation[0].runs.len());
+        assert_eq!(run[0].runs.last().unwrap().name, "spin-d8");
+        for (name, message, help) in [
+            ("rotaton", "there is no validation \"rotaton\"", "\"rotation\""),
+            ("x/y", "there is no validation \"x\"", "There are: array, "),
+            ("rotation/", "the validation \"rotation\" has no run \"\"", "It has: "),
+            ("rotation/spin-d9", "has no run \"spin-d9\"", "\"spin-d8\""),
+        ] {
+            let SuiteError::Invalid(problem) = chosen(name).unwrap_err() else { panic!("{name}") };
+            assert!(problem.message.contains(message), "{}", problem.message);
+            assert!(problem.help.as_ref().unwrap().contains(help), "{:?}", problem.help);
+        }
+        let empty = Library { suites: Vec::new(), _unpacked: None };
+        let message = empty.chosen(&[]).unwrap_err().to_string();
+        assert!(message.contains("no validation in the folder"), "{message}");
+    }
+
+    fn describe_runs(suites: &[Suite]) -> Vec<(String, usize)> {
+        suites.iter().map(|suite| (suite.name.clone(), suite.runs.len())).collect()
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_formats::summary::Summary;
-use grainwake_run::case::{Case, did_you_mean};
+use grainwake_run::case::Case;
 use grainwake_run::provenance::Provenance;
 use grainwake_run::{Ending, Existing, Options, RunError};
 use grainwake_validation::{Level, Library, Suite, SuiteError, SuiteRun};
@@ -41,7 +41,7 @@ impl From<SuiteError> for Exit {
 /// Runs validations and prints the deviation of each value from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let library = Library::open(args.suites.as_deref())?;
-    let mut suites = chosen(library.suites.clone(), &args.names)?;
+    let mut suites = library.chosen(&args.names)?;
     for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
         run.set.extend(args.overrides.list());
     }
@@ -116,47 +116,6 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
         MISSED,
         format!("{short} of {} fall short:\n{}", results.len(), missed.join("\n")),
     ))
-}
-
-/// Returns the suites and runs with the given names; all without names.
-fn chosen(all: Vec<Suite>, names: &[String]) -> Result<Vec<Suite>, Exit> {
-    let known: Vec<String> = all.iter().map(|s| s.name.clone()).collect();
-    if all.is_empty() {
-        return Err(Exit::refused(
-            "there is no validation in the folder",
-            "each is a folder with a validation.toml; give their parent with --suites",
-        ));
-    }
-    for name in names {
-        let (suite, run) = name.split_once('/').unwrap_or((name, ""));
-        if let Some(suite) = all.iter().find(|s| s.name == suite && !run.is_empty()) {
-            let runs: Vec<&str> = suite.runs.iter().map(|r| r.name.as_str()).collect();
-            if !runs.contains(&run) {
-                let hint = did_you_mean(run, runs.iter().copied());
-                return Err(Exit::refused(
-                    format!("the validation \"{}\" has no run \"{run}\"", suite.name),
-                    format!("{hint}It has: {}", runs.join(", ")),
-                ));
-            }
-        } else if !known.iter().any(|known| known == name) {
-            let hint = did_you_mean(name, known.iter().map(String::as_str));
-            return Err(Exit::refused(
-                format!("there is no validation \"{name}\""),
-                format!("{hint}There are: {}", known.join(", ")),
-            ));
-        }
-    }
-    let mut chosen = Vec::new();
-    for mut suite in all {
-        if !names.is_empty() && !names.contains(&suite.name) {
-            let name = suite.name.clone();
-            suite = suite.restricted_to(|run| names.contains(&format!("{name}/{run}")));
-        }
-        if !suite.runs.is_empty() {
-            chosen.push(suite);
-        }
-    }
-    Ok(chosen)
 }
 
 /// Returns whether `folder` holds a finished run of the same case.

@@ -315,6 +315,22 @@ fn two_damaged_checkpoints_end_with_exit_code_4() {
 }
 
 #[test]
+fn a_run_without_checkpoints_is_not_replaced_by_resuming() {
+    let (folder, case) = folder_with(WET);
+    let finished = folder.path().join("finished");
+    run(&case, &finished, &["--set", "time.end=3 ms"]).success();
+    let killed = unfinished(folder.path(), &case);
+    for out in [finished, killed] {
+        std::fs::remove_dir_all(out.join("checkpoint")).unwrap();
+        let before = crate::common::contents(&out);
+        let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).code(4);
+        let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert!(message.contains("no checkpoint") && message.contains("--force"), "{message}");
+        assert_eq!(before, crate::common::contents(&out), "nothing may change");
+    }
+}
+
+#[test]
 fn a_finished_run_is_not_overwritten() {
     let (folder, case) = folder_with(DRY);
     let out = folder.path().join("run");

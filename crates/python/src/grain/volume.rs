@@ -7,11 +7,16 @@ use pyo3::prelude::*;
 use sha2::{Digest, Sha256};
 
 use crate::arguments::{array, wrong_shape};
+use crate::error::input;
 
 /// Returns an array of the shape (z, y, x) as a volume: integers and booleans are labels, floating
 /// numbers grey values.
 pub(super) fn volume(image: &Bound<'_, PyAny>) -> PyResult<Volume> {
-    let plain = image.py().import("numpy")?.call_method1("asarray", (image,))?;
+    let numpy = image.py().import("numpy")?;
+    if numpy.getattr("ma")?.call_method1("isMaskedArray", (image,))?.is_truthy()? {
+        return Err(input("image: found a masked array; fill its masked voxels first (filled)"));
+    }
+    let plain = numpy.call_method1("asarray", (image,))?;
     let kind: String = plain.getattr("dtype")?.getattr("kind")?.extract()?;
     let is_label = matches!(kind.as_str(), "b" | "u" | "i") && fits_labels(&plain)?;
     let (shape, voxels) = if is_label {
@@ -26,6 +31,12 @@ pub(super) fn volume(image: &Bound<'_, PyAny>) -> PyResult<Volume> {
     };
     if nx * ny * nz == 0 {
         return Err(wrong_shape("image", &shape, "at least one voxel along each axis"));
+    }
+    if let Voxels::Grey(values) = &voxels
+        && let Some(n) = values.iter().position(|value| !value.is_finite())
+    {
+        let at = [n / (nx * ny), n / nx % ny, n % nx];
+        return Err(input(format!("image: found {} at the voxel {at:?} (z, y, x)", values[n])));
     }
     Ok(Volume { dims: [nx, ny, nz], voxels })
 }

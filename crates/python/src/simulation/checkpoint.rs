@@ -79,11 +79,17 @@ impl PySimulation {
     /// path : path-like
     ///     File; an existing one is replaced.
     ///
+    /// Raises
+    /// ------
+    /// SolverError
+    ///     The simulation has failed.
+    ///
     /// Notes
     /// -----
     /// Prescribed motions and external loads are not part of the state: set them again after
     /// `restore_checkpoint`.
     fn save_checkpoint(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        self.has_not_failed()?;
         let written = py.detach(|| {
             let bytes = self.encode()?;
             write_atomically(&path, true, |out| out.write_all(&bytes))

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use grainwake_run::case::quantity::{AngularVelocity, Force, Kind, Torque, Velocity};
+use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::MotionComponent;
 use pyo3::exceptions::PyIndexError;
@@ -73,7 +74,14 @@ impl PySimulation {
         angular_velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let grain = self.index(grain)?;
-        for (component, value) in motions(velocity, angular_velocity)? {
+        let Grain { translation, rotation, .. } = self.sim.grains()[grain];
+        let mut motions = motions(velocity, angular_velocity)?;
+        // A prescribed motion is refused before the other one has changed.
+        motions.sort_by_key(|(component, _)| match component {
+            MotionComponent::Translation => translation == MotionConstraint::Free,
+            MotionComponent::Rotation => rotation == MotionConstraint::Free,
+        });
+        for (component, value) in motions {
             self.sim.set_velocity(grain, component, value).raise()?;
         }
         Ok(())

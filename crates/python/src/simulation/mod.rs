@@ -119,11 +119,19 @@ impl PySimulation {
         }
     }
 
+    /// Refuses to use a simulation that has failed.
+    fn has_not_failed(&self) -> PyResult<()> {
+        match &self.failed {
+            Some(message) => {
+                Err(numerics(format!("{message}\nThe simulation cannot be continued.")))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Refuses to use a simulation that has failed or whose run folder is closed.
     fn may_continue(&self) -> PyResult<()> {
-        if let Some(message) = &self.failed {
-            return Err(numerics(format!("{message}\nThe simulation cannot be continued.")));
-        }
+        self.has_not_failed()?;
         if self.output.is_some() && self.recording.is_none() {
             return Err(input(CLOSED));
         }

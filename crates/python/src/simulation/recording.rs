@@ -74,7 +74,7 @@ pub(super) fn start(
     pool: &ThreadPool,
 ) -> PyResult<(Simulation, Recording)> {
     let options = Options {
-        existing: existing(resume, force),
+        existing: existing(resume, force)?,
         command: command(py)?,
         threads,
         controlled_from: Some(PROGRAM.into()),

@@ -24,6 +24,8 @@ type Edge = (usize, usize);
 const SAMPLES: (f64, f64) = (62.0, 400.0);
 /// Samples across the thinnest part of a grain, if the most along the longer side allow it.
 const SAMPLES_ACROSS: f64 = 24.0;
+/// Parts of a sample of the mask along each axis, over which it is averaged.
+const PARTS: usize = 3;
 /// Empty samples around the mask.
 const EMPTY: f64 = 4.5;
 
@@ -248,13 +250,21 @@ fn outlines(points: &[(f64, f64)], triangles: &[[usize; 3]], thinnest: f64) -> V
     }
     let (x0, y0) = (x0 - EMPTY * step, y0 - EMPTY * step);
     let samples = |low: f64, high: f64| ((high - low) / step + EMPTY).ceil() as usize + 1;
-    let mut mask = Mask::new(samples(x0, x1), samples(y0, y1));
-    let local = points.iter().map(|(x, y)| ((x - x0) / step, (y - y0) / step));
+    let (nx, ny) = (samples(x0, x1), samples(y0, y1));
+    let mut mask = Mask::new(PARTS * nx, PARTS * ny);
+    let scale = PARTS as f64 / step;
+    let local = points.iter().map(|(x, y)| (scale * (x - x0), scale * (y - y0)));
     let local: Vec<(f64, f64)> = local.collect();
     for triangle in triangles {
         mask.paint(triangle.map(|i| local[i]));
     }
-    let smooth = mask.blurred().blurred();
+    // The mean over the parts of a sample is the covered share, whose contour keeps edges straight.
+    let covered = mask.blurred();
+    let mut smooth = Mask::new(nx, ny);
+    for (n, value) in smooth.values.iter_mut().enumerate() {
+        *value = covered.at(PARTS * (n % nx), PARTS * (n / nx));
+    }
+    let smooth = smooth.blurred();
     let loops = contour::closed_contours(smooth.nx, smooth.ny, |i, j| smooth.at(i, j), 0.5);
     let place = |(i, j): (f64, f64)| (x0 + i * step, y0 + j * step);
     loops.into_iter().map(|ring| ring.into_iter().map(place).collect()).collect()
@@ -349,6 +359,26 @@ mod tests {
         assert!((area(turned) / 2e-6 - 1.0).abs() < 0.03, "{}", area(turned));
         let centre = side.iter().map(|p| p.0).sum::<f64>() / side.len() as f64;
         assert!((centre - 0.1).abs() < 1e-4);
+    }
+
+    #[test]
+    fn straight_edges_stay_straight() {
+        let body = block(2e-3, 1.2e-3, 0.5e-3);
+        for turn in [0.1, 0.35, 0.7] {
+            let pose = DQuat::from_rotation_y(turn);
+            let [ring] = &body.outlines(DVec3::ZERO, pose, 0, 2)[..] else { panic!("one outline") };
+            let (sin, cos) = turn.sin_cos();
+            let mut largest = 0.0_f64;
+            for (x, z) in ring {
+                // Distance from the edges of the rectangle, away from its corners.
+                let (along, across) = ((cos * x - sin * z).abs(), (sin * x + cos * z).abs());
+                if along < 1.8e-3 && across > 0.3e-3 {
+                    largest = largest.max((across - 0.5e-3).abs());
+                }
+            }
+            // A hundredth of the length of the side, which is a fifth of a sample.
+            assert!(largest < 2e-5, "turned by {turn}: {largest:e}");
+        }
     }
 
     /// A needle is thinner than a sample of a mask with a fixed number of samples.

@@ -45,7 +45,7 @@ pub fn many(scene: &Scene) -> Option<Figure> {
         let last = short(last_contacts);
         caption += &format!(" (c) Mean number of contacts of a grain, {last} at the end.");
     }
-    Some(scene.without_events("history", "Coming to rest", caption, &panels))
+    Some(scene.without_events("history", "Height, speed and contacts", caption, &panels))
 }
 
 /// Largest number of grains that have curves of their own.

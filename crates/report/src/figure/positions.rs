@@ -127,7 +127,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let time = run.grains[grains[0]].time[last(grains[0])];
     let caption = format!(
         "The {} grains at *t* = {} s, from the side (along {}) and from above, as {}; colour shows \
-         the height of the centre. The highest centre lies {} mm above the floor of the box.{}",
+         the height of the centre. The highest centre lies {} mm above the lower side of the box.{}",
         grains.len(),
         short(time),
         AXES[depth],

@@ -233,6 +233,14 @@ fn flatten(rows: &mut Rows, name: &str, value: &Value, depth: usize) {
             let texts: Vec<String> = list.iter().map(text).collect();
             rows.add_code(name, &texts.join(" "));
         }
+        Value::Array(list) if name.ends_with("passes") => {
+            let pass = |pass: &Value| {
+                let name = pass.get("name").map(text).unwrap_or_default();
+                let wall = pass.get("wall_s").and_then(Value::as_f64);
+                format!("{name} {}", wall.map_or("not known".to_owned(), duration))
+            };
+            rows.add_code(name, &list.iter().map(pass).collect::<Vec<_>>().join(", "));
+        }
         Value::Array(list) if depth < 4 => {
             for (i, value) in list.iter().take(SESSIONS).enumerate() {
                 let name = format!("{} {}", name.trim_end_matches('s'), i + 1);

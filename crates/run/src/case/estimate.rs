@@ -98,7 +98,10 @@ impl Estimate {
         let speed =
             (largest.zip(fluid)).map(|((_, grain, _), fluid)| terminal_speed(grain, fluid, g));
         let allowed = time_step(setup, speed.unwrap_or(0.0));
-        let time_step_s = plan.intervals().fold(allowed, f64::min);
+        // Whole numbers of equal steps lead from output to output.
+        let interval = plan.intervals().fold(f64::INFINITY, f64::min);
+        let steps_of_interval = (interval / allowed - 1e-9).ceil().max(1.0);
+        let time_step_s = if interval.is_finite() { interval / steps_of_interval } else { allowed };
         let landing = plan.stop.as_ref().filter(|stop| stop.when == StopWhen::Landing);
         let landing = landing.and_then(|stop| Some(landing_time(setup)? + stop.hold));
         let expected_end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));

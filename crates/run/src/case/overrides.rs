@@ -80,6 +80,14 @@ pub(super) fn remove_key(table: &mut DeTable, key: &str) -> Result<(), Problem> 
     };
     let names = |table: &DeTable| table.keys().map(|key| key.get_ref().to_string()).collect();
     let (parents, last) = key.rsplit_once('.').map_or((None, key), |(p, l)| (Some(p), l));
+    let list = parents.and_then(|list| table.get(list)).map(Spanned::get_ref);
+    if let (Some(DeValue::Array(items)), Ok(index)) = (list, last.parse::<usize>())
+        && index < items.len()
+    {
+        let help = "a row cannot be removed; leave it out of the case file";
+        let message = format!("--unset {key}: this is a row of a list, not a key");
+        return Err(Problem::new(message).help(help));
+    }
     let mut table = table;
     let mut parts = parents.into_iter().flat_map(|parents| parents.split('.'));
     while let Some(part) = parts.next() {

@@ -127,17 +127,7 @@ impl<K: Kind> Notation for Quantity<K> {
         (number.is_finite().then(|| Quantity::new(number))).ok_or_else(refused)
     }
     fn from_number(number: f64) -> Result<Self, String> {
-        if !number.is_finite() {
-            return Err(format!("found {number}; expected {}", K::EXPECTED));
-        }
-        // Degrees without a unit are the commonest mistake.
-        if K::SI == Angle::SI && number.abs() > TAU {
-            return Err(format!(
-                "found {number}, which is more than a turn in radians; write \"{number} deg\" for \
-                 degrees, or \"{number} rad\""
-            ));
-        }
-        Ok(Quantity::new(number))
+        without_unit::<K>(number).map(Quantity::new)
     }
     fn scalar_schemas(_: &mut SchemaGenerator) -> Vec<Schema> {
         let word = json_schema!({ "type": "string", "examples": [K::EXAMPLE] });
@@ -194,6 +184,21 @@ impl<K: Kind> JsonSchema for Triple<K> {
     }
 }
 
+/// Accepts a number without a unit as a quantity of kind `K`; the error says what is accepted.
+pub fn without_unit<K: Kind>(number: f64) -> Result<f64, String> {
+    if !number.is_finite() {
+        return Err(format!("found {number}; expected {}", K::EXPECTED));
+    }
+    // Degrees without a unit are the commonest mistake.
+    if K::SI == Angle::SI && number.abs() > TAU {
+        return Err(format!(
+            "found {number}, which is more than a turn in radians; write \"{number} deg\" for \
+             degrees, or \"{number} rad\""
+        ));
+    }
+    Ok(number)
+}
+
 /// Reads "2 mm" as a quantity of kind `K` in SI units; the error says what is accepted.
 pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let trimmed = text.trim();
@@ -203,7 +208,7 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
         .map_err(|_| format!("\"{text}\" does not start with a number; write {}", K::EXPECTED))?;
     let unit = trimmed[end..].trim();
     if unit.is_empty() {
-        return Ok(value);
+        return without_unit::<K>(value);
     }
     let scale = parse_unit(unit).map_err(|error| match error {
         UnitError::Unknown(symbol) => {

@@ -58,7 +58,7 @@ fn reynolds_with(galileo: f64, drag: impl Fn(f64) -> f64) -> f64 {
     if wanted <= 0.0 {
         return 0.0;
     }
-    let (mut low, mut high) = (1e-12_f64, 1e9_f64);
+    let (mut low, mut high) = (1e-12_f64, 1e15_f64);
     for _ in 0..200 {
         let middle = (low * high).sqrt();
         if drag(middle) * middle * middle < wanted { low = middle } else { high = middle }
@@ -72,6 +72,17 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
         / grain.shape.equivalent_diameter()
 }
 
+/// Returns axis and side of the floor and the direction in which the grains fall; none if that side
+/// of the box is no wall.
+pub(super) fn floor(setup: &Setup) -> Option<(usize, usize, DVec3)> {
+    let density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+    let EventParams { down, floor: (axis, side), .. } =
+        EventParams::for_grains(&setup.grains, setup.gravity, density, setup.enclosure());
+    let (axis, side) = (axis as usize, side as usize);
+    let wall = setup.boundaries.0[axis][side];
+    matches!(wall, Boundary::Wall { .. } | Boundary::Slip).then_some((axis, side, down))
+}
+
 /// Returns the time at which the last free grain is expected to touch the floor [s]; `None` if
 /// there is no floor, a grain does not fall, something else drives the fluid, or the grains cover
 /// half of the floor, so that some may come to rest on others.
@@ -81,12 +92,7 @@ pub fn terminal_speed(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {
 /// the start and other walls are left out.
 pub(super) fn landing_time(setup: &Setup) -> Option<f64> {
     let (g, density) = (setup.gravity.length(), setup.fluid.map_or(0.0, |fluid| fluid.density));
-    let EventParams { down, floor: (axis, side), .. } =
-        EventParams::for_grains(&setup.grains, setup.gravity, density, setup.enclosure());
-    let (axis, side) = (axis as usize, side as usize);
-    if !matches!(setup.boundaries.0[axis][side], Boundary::Wall { .. } | Boundary::Slip) {
-        return None;
-    }
+    let (axis, side, down) = floor(setup)?;
     let cross_section = |grain: &Grain| grain.shape.equivalent_diameter().powi(2) * FRAC_PI_4;
     let covered: f64 = setup.grains.iter().map(cross_section).sum();
     let extent = setup.mesh.extent();

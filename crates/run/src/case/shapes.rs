@@ -138,8 +138,14 @@ fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
     let length =
         |value: &Option<Located<Quantity<Length>>>| value.as_ref().map_or(f64::NAN, |v| v.si);
     let (diameter, height) = (length(&raw.diameter), length(&raw.height));
+    for (name, value) in [("diameter", diameter), ("height", height)] {
+        if value <= 0.0 {
+            let help = "give a positive length with its unit, such as \"2 mm\"";
+            return Err((format!("`{name}` is {value}"), help.to_owned()));
+        }
+    }
     let [a, b, c] = raw.size.as_ref().map_or([f64::NAN; 3], |v| v.si.to_array());
-    let [e1, e2] = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value);
+    let [e1, e2] = raw.exponents.as_ref().map_or([f64::NAN; 2], |e| e.value.0);
     let shape = match kind {
         ShapeKind::Sphere => analytic::sphere(0.5 * diameter, &options),
         ShapeKind::Ellipsoid => analytic::ellipsoid(0.5 * a, 0.5 * b, 0.5 * c, &options),

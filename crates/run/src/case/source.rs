@@ -65,6 +65,7 @@ impl Source {
         text: &str,
         overrides: &[String],
     ) -> Result<(Source, T), Problem> {
+        admit(name, text)?;
         let mut source = Source {
             name: name.into(),
             text: text.into(),
@@ -221,7 +222,15 @@ impl Source {
                     Some(kind) => format!("wrong kind of value: {}", wrong_kind(kind)),
                     None => plainly(message),
                 };
-                (text, "here".into(), shape_help(&owner))
+                let help = match message {
+                    "duplicate key" => Some(
+                        "each key and table is written once; rows of a list such as the grains \
+                         have double brackets: [[grain]]"
+                            .to_owned(),
+                    ),
+                    _ => shape_help(&owner),
+                };
+                (text, "here".into(), help)
             }
         };
         let mut problem = Problem::new(text);
@@ -239,6 +248,18 @@ impl Source {
             .key(key)
             .help(format!("add {help}; `grainwake schema` lists every key"))
     }
+}
+
+/// Refuses text of another kind than TOML, for which the messages of its reader make no sense.
+fn admit(name: &str, text: &str) -> Result<(), Problem> {
+    let is_binary = text.chars().any(|c| c.is_control() && !c.is_whitespace());
+    let is_json = text.trim_start().starts_with('{');
+    if !is_binary && !is_json {
+        return Ok(());
+    }
+    let what = if is_binary { "not a file of text" } else { "JSON, not TOML" };
+    let help = "expected is a TOML file with lines such as `key = value` and `[table]`";
+    Err(Problem::new(format!("{name} is {what}")).help(help))
 }
 
 /// Remedy for a wrong value of a key `shape` or `shapes`, or inside of it.

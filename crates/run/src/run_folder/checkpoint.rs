@@ -14,11 +14,12 @@ use sha2::{Digest, Sha256};
 use grainwake_formats::codec::{Decoder, Encoder};
 use grainwake_formats::disk::{self, sync_folder, write_atomically};
 use grainwake_formats::pvd::Entry;
+use grainwake_formats::summary;
 use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::TrackerState;
 
 use super::ExtraTable;
-use super::tables::Lengths;
+use super::tables::{self, Lengths};
 use crate::contact_events::{PairEvents, WallEvents};
 use crate::contact_work::ContactWork;
 use crate::error::{Context, RunError};
@@ -229,10 +230,11 @@ fn read_own(
 }
 
 /// Restores the newest valid checkpoint that the tables reach; `note` receives the faults of newer
-/// ones. None if the run has no checkpoint.
+/// ones. None if the run was interrupted before its first checkpoint.
 ///
 /// # Errors
-/// [`RunError::NoCheckpoint`] if there are checkpoints and none is valid.
+/// [`RunError::NoCheckpoint`] if there are checkpoints and none is valid, or if there is none and
+/// the run has results.
 pub(crate) fn restore(
     run: &Path,
     digest: &str,
@@ -255,13 +257,16 @@ pub(crate) fn restore(
             Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
         }
     }
+    if reasons.is_empty() && (run.join(summary::FILE).exists() || tables::go_on(run)) {
+        reasons.push("the folder has none; they may have been removed".to_owned());
+    }
     if reasons.is_empty() {
         Ok(None)
     } else {
         Err(RunError::NoCheckpoint {
             folder: run.join(FOLDER),
             reasons,
-            remedy: "Run again without --resume (and with --force) to start over",
+            remedy: "To start over, run again with --force instead of --resume",
         })
     }
 }

@@ -25,10 +25,12 @@ const MAX_VALUE: usize = 40;
 
 /// Describes how the case of a run folder differs from a resolved case.
 pub fn differing(folder: &Path, resolved: &str) -> String {
-    let there = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
+    let Ok(there) = std::fs::read_to_string(folder.join(RESOLVED)) else {
+        return format!("its {RESOLVED} is missing or cannot be read");
+    };
     let (Ok(there), Ok(here)) = (there.parse::<toml::Table>(), resolved.parse::<toml::Table>())
     else {
-        return "its case.resolved.toml cannot be read".into();
+        return format!("its {RESOLVED} is damaged");
     };
     let (there, here) = (flatten(there), flatten(here));
     let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();

@@ -17,6 +17,10 @@ use crate::number_format::quantity;
 /// Name of the case file with all defaults written out.
 pub const RESOLVED: &str = "case.resolved.toml";
 
+/// Description of a folder whose provenance cannot be read.
+const PROVENANCE_DAMAGED: &str =
+    "holds a run whose provenance.json is damaged, so that its case is not known";
+
 /// Treatment of an existing run in the folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
@@ -100,6 +104,9 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
     }
     let present = content(folder)?;
     match (present, existing) {
+        (Content::Foreign, _) if folder.join(provenance::FILE).exists() => {
+            occupied(PROVENANCE_DAMAGED, "give another folder with -o, or remove this one")
+        }
         (Content::Foreign, _) => {
             occupied("is not empty and holds no run of this program", "give another folder with -o")
         }

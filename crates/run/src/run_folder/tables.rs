@@ -48,6 +48,12 @@ fn names(extra: &[ExtraTable]) -> impl Iterator<Item = String> {
     FILES.map(str::to_owned).into_iter().chain(extra.iter().map(ExtraTable::file))
 }
 
+/// Returns whether the tables in a run folder hold rows after those of the first state.
+pub(super) fn go_on(run: &Path) -> bool {
+    File::open(run.join(diagnostics::FILE))
+        .is_ok_and(|file| BufReader::new(file).lines().nth(2).is_some())
+}
+
 /// Growing file, open for appending.
 struct GrowingFile {
     path: PathBuf,

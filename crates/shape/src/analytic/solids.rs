@@ -53,17 +53,17 @@ pub fn rounded_box(
     assemble(&body, provenance, options)
 }
 
-/// Builds a circular cylinder of `radius` and `length` [m]. Its axis is x for a rod and z for a
-/// disc (length below sqrt(3) radii), following the order of the principal moments.
-pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
+/// Builds a circular cylinder of `radius` and `height` [m]. Its axis is x for a rod and z for a
+/// disc (height below sqrt(3) radii), following the order of the principal moments.
+pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
     size("radius", radius)?;
-    size("length", length)?;
-    let long = length >= 3f64.sqrt() * radius;
-    let half = 0.5 * length;
+    size("height", height)?;
+    let long = height >= 3f64.sqrt() * radius;
+    let half = 0.5 * height;
     let provenance = Provenance::new("analytic")
         .with("body", "cylinder")
         .with("radius_m", radius)
-        .with("length_m", length);
+        .with("length_m", height);
     let extent =
         if long { DVec3::new(half, radius, radius) } else { DVec3::new(radius, radius, half) };
     let body = Body {
@@ -74,32 +74,32 @@ pub fn cylinder(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shap
         },
         lower: -extent,
         upper: extent,
-        volume: Some(PI * radius * radius * length),
-        area: Some(2.0 * PI * radius * (radius + length)),
+        volume: Some(PI * radius * radius * height),
+        area: Some(2.0 * PI * radius * (radius + height)),
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
 }
 
-/// Builds a cylinder of `radius` and `length` [m] along x with a hemisphere at either end (total
-/// length `length` + 2 `radius`).
-pub fn capsule(radius: f64, length: f64, options: &ShapeOptions) -> Result<Shape> {
+/// Builds a cylinder of `radius` and `height` [m] along x with a hemisphere at either end (total
+/// length `height` + 2 `radius`).
+pub fn capsule(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
     size("radius", radius)?;
-    size("length", length)?;
-    let half = 0.5 * length;
+    size("height", height)?;
+    let half = 0.5 * height;
     let extent = DVec3::new(half + radius, radius, radius);
     let provenance = Provenance::new("analytic")
         .with("body", "capsule")
         .with("radius_m", radius)
-        .with("length_m", length);
+        .with("length_m", height);
     let body = Body {
         distance: |x: DVec3, _: &mut u32| {
             DVec3::new((x.x.abs() - half).max(0.0), x.y, x.z).length() - radius
         },
         lower: -extent,
         upper: extent,
-        volume: Some(PI * radius * radius * (length + 4.0 / 3.0 * radius)),
-        area: Some(2.0 * PI * radius * (length + 2.0 * radius)),
+        volume: Some(PI * radius * radius * (height + 4.0 / 3.0 * radius)),
+        area: Some(2.0 * PI * radius * (height + 2.0 * radius)),
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)

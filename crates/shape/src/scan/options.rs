@@ -82,6 +82,7 @@ impl ScanOptions {
     /// Checks the numeric options.
     pub(super) fn check(&self) -> Result<()> {
         size("voxel size", self.voxel)?;
+        self.shape.check()?;
         if let Some(smoothing) = self.smoothing {
             let reason = "must lie between 0.5 and 5 voxels";
             within("smoothing", smoothing, 0.5..=5.0, reason)?;

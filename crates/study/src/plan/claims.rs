@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use grainwake_run::case::exactly;
 use serde::{Deserialize, Serialize};
 
 /// Requested analysis of the results: claims, correlations, figures.
@@ -102,6 +103,7 @@ pub enum Test {
         /// Axis.
         axis: String,
         /// The two levels.
+        #[serde(deserialize_with = "exactly")]
         values: [String; 2],
         /// Relative difference that counts as equal.
         within: f64,

@@ -67,6 +67,7 @@ pub(crate) fn expand(
         });
         for axis in &raw.axis {
             problems.check_axis(axis, &raw.axis);
+            problems.check_factors_of_others(axis, &raw.axis);
             if !problems.check_count(axis, models.len()) {
                 return Err(problems.found);
             }
@@ -200,6 +201,24 @@ impl Problems<'_> {
             let message = format!("the factor \"{name}\" is {}", factor.value);
             let help = "a factor is a finite number; leave it out where there is none";
             self.add(message, help, factor.span.as_ref(), "not finite");
+        }
+    }
+
+    /// Refuses factors that an earlier axis has too, whose values would be lost.
+    fn check_factors_of_others(&mut self, axis: &RawAxis, all: &[RawAxis]) {
+        let of = |axis: &RawAxis| -> BTreeMap<String, Option<Range<usize>>> {
+            let values = axis.values.value.iter().flat_map(|value| &value.factors);
+            values.map(|(name, factor)| (name.clone(), factor.span.clone())).collect()
+        };
+        let earlier = all.iter().take_while(|other| other.name.value != axis.name.value);
+        let earlier: Vec<(&str, _)> =
+            earlier.map(|other| (other.name.value.as_str(), of(other))).collect();
+        for (name, span) in of(axis) {
+            if let Some((other, _)) = earlier.iter().find(|(_, names)| names.contains_key(&name)) {
+                let message = format!("the axis \"{other}\" has the factor \"{name}\" too");
+                let help = "give the factors of different axes different names";
+                self.add(message, help, span.as_ref(), "given twice");
+            }
         }
     }
 

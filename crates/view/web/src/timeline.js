@@ -7,6 +7,14 @@ import { seconds, short } from "./format.js";
 const NOMINAL = 14;
 const PACES = [0.1, 0.25, 0.5, 1, 2, 4];
 
+/** Name of an event, with its grains unless both grains of a pair take part. */
+function eventName(event, count) {
+  const [grain, other] = event.grains;
+  if (event.event === "left") return `grain ${grain} left`;
+  if (event.grains.length === 1) return `${event.label} of grain ${grain}`;
+  return count > 2 ? `${event.label} of ${grain} and ${other}` : event.label;
+}
+
 export class Timeline {
   constructor(store, extent) {
     this.store = store;
@@ -62,7 +70,7 @@ export class Timeline {
     for (const run of runs) {
       for (const event of run.events) {
         const [grain] = event.grains;
-        const name = event.event === "left" ? `grain ${grain} left` : event.grains.length === 1 ? `${event.label} of grain ${grain}` : event.label;
+        const name = eventName(event, run.grains.length);
         const time = `${seconds(event.time, end - start)} s`;
         const jump = () => this.store.set({ time: event.time, playing: false });
         const details = [name, time, several ? run.name : null, Number.isFinite(event.gap) ? `gap ${short(event.gap)} m` : null];

@@ -4,6 +4,7 @@ use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize, Serializer};
 
+use crate::case::exactly::Exactly;
 use crate::case::located::Located;
 use crate::case::notation::{Notation, Unsupported, notations, variant};
 use crate::case::quantity::{Length, Quantity, Triple, Velocity};
@@ -15,7 +16,7 @@ pub struct RawDomain {
     /// Edge lengths of the box along x, y, z [m].
     pub size: Option<Located<Triple<Length>>>,
     /// Number of cells along x, y, z; 1 makes a flat axis, which must be periodic.
-    pub cells: Option<Located<[usize; 3]>>,
+    pub cells: Option<Located<Exactly<usize, 3>>>,
     /// Cell edge [m]: one length, or one for each axis.
     pub cell_size: Option<Located<CellSize>>,
     /// Cells along the edge of a cell in a box around the grains, which moves with them: 1 or 2.
@@ -37,7 +38,7 @@ pub struct CellSize(pub DVec3);
 
 impl Notation for CellSize {
     const EXPECTED: &'static str = "a length such as \"0.25 mm\", or three of them";
-    type List = [Quantity<Length>; 3];
+    type List = Exactly<Quantity<Length>, 3>;
     type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
         Quantity::<Length>::from_word(word).and_then(|h| Self::from_number(h.si))
@@ -45,7 +46,7 @@ impl Notation for CellSize {
     fn from_number(number: f64) -> Result<Self, String> {
         Ok(CellSize(DVec3::splat(number)))
     }
-    fn from_list(list: Self::List) -> Result<Self, String> {
+    fn from_list(Exactly(list): Self::List) -> Result<Self, String> {
         Ok(CellSize(DVec3::from_array(list.map(|q| q.si))))
     }
     fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
@@ -97,12 +98,12 @@ pub struct AxisTable {
 impl Notation for AxisFaces {
     const EXPECTED: &'static str = "a condition for both sides (\"periodic\", \"wall\", ...), \
         a pair [lower, upper], or { lower = ..., upper = ... }";
-    type List = [Located<Face>; 2];
+    type List = Exactly<Located<Face>, 2>;
     type Table = AxisTable;
     fn from_word(word: &str) -> Result<Self, String> {
         Face::from_word(word).map(AxisFaces::both)
     }
-    fn from_list([lower, upper]: Self::List) -> Result<Self, String> {
+    fn from_list(Exactly([lower, upper]): Self::List) -> Result<Self, String> {
         Ok(AxisFaces { lower, upper })
     }
     fn from_table(table: AxisTable) -> Result<Self, String> {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::RawMotion;
 use super::orientation::{Orientation, Turns};
+use crate::case::exactly::Exactly;
 use crate::case::located::{Located, is_default};
 use crate::case::notation::{Notation, Unsupported, notations, refusal};
 use crate::case::quantity::{
@@ -71,7 +72,7 @@ pub struct RawShape {
     /// Edge radius of a rounded box [m].
     pub radius: Option<Located<Quantity<Length>>>,
     /// Exponents e1, e2 of a superquadric (Barr 1981), 0.1 to 2; 1, 1 is an ellipsoid.
-    pub exponents: Option<Located<[f64; 2]>>,
+    pub exponents: Option<Located<Exactly<f64, 2>>>,
 }
 
 /// Closed forms that can be written in a case file.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::check::Checker;
+use crate::case::exactly::Exactly;
 use crate::case::located::{Located, Span};
 use crate::case::quantity::{Length, Triple};
 use crate::case::raw::{
@@ -36,25 +37,25 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         let help = "give a positive length such as \"0.25 mm\"";
         return check.refuse(&cell.span, message, help);
     }
-    let possible = |cells: &[usize; 3]| cells.iter().all(|n| (1..=MOST_CELLS).contains(n));
+    let possible = |cells: &Exactly<usize, 3>| cells.0.iter().all(|n| (1..=MOST_CELLS).contains(n));
     if let Some(cells) = raw.cells.as_ref().filter(|cells| !possible(cells)) {
-        let message = format!("found {:?} cells", cells.value);
+        let message = format!("found {:?} cells", cells.0);
         let help = format!("each axis needs 1 to {MOST_CELLS} cells");
         return check.refuse(&cells.span, message, help);
     }
     let as_vector = |cells: [usize; 3]| DVec3::from_array(cells.map(|n| n as f64));
     let (cells, spacing) = match (&raw.size, &raw.cells, &raw.cell_size) {
         (size, Some(cells), Some(cell)) => {
-            let extent = as_vector(cells.value) * cell.0;
+            let extent = as_vector(cells.value.0) * cell.0;
             let differs = |size: DVec3| ((size - extent) / extent).abs().max_element() > 1e-9;
             if let Some(size) = size.as_ref().filter(|size| differs(size.si)) {
                 let (size, extent) = (vector(size.si, "m"), vector(extent, "m"));
                 let message = format!("size {size} is not cells times cell_size, {extent}");
                 return check.refuse(&cells.span, message, "give two of size, cells and cell_size");
             }
-            (cells.value, cell.0)
+            (cells.value.0, cell.0)
         }
-        (Some(size), Some(cells), None) => (cells.value, size.si / as_vector(cells.value)),
+        (Some(size), Some(cells), None) => (cells.value.0, size.si / as_vector(cells.value.0)),
         (Some(size), None, Some(cell)) => (divide(check, size, cell)?, cell.0),
         (Some(size), None, None) if dry => ([1; 3], size.si),
         _ => {
@@ -70,10 +71,15 @@ pub(super) fn mesh(check: &mut Checker, raw: &mut RawDomain, dry: bool) -> Optio
         let message = format!("{cells:?} cells are more than any machine holds");
         return check.refuse(span.unwrap_or(&None), message, COARSER);
     }
+    if !dry && cells == [1; 3] {
+        let span = raw.cells.as_ref().map_or(&None, |cells| &cells.span);
+        let help = "make the box larger or the cells smaller; without a fluid leave out [fluid]";
+        return check.refuse(span, "a fluid needs more than one cell", help);
+    }
     let origin = raw.origin.si;
     let mesh = Mesh { cells, spacing, origin };
     raw.size = Some(Triple::new(mesh.extent()).into());
-    raw.cells = Some(cells.into());
+    raw.cells = Some(Exactly(cells).into());
     raw.cell_size = Some(CellSize(spacing).into());
     Some(mesh)
 }

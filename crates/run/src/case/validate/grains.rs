@@ -194,7 +194,7 @@ pub(super) fn not_too_light(
         "accepted: at least {LIGHTEST_FREE} times the fluid's density, {least}, or a grain whose velocity is prescribed (motion)"
     );
     if density.si < 30.0 && check.is_bare(check.key(&density.span)) {
-        help.push_str("; kg/m3? was a unit such as g/cm3 forgotten?");
+        help.push_str("; without a unit it is in kg/m3: was \"g/cm3\" forgotten?");
     }
     let message = format!(
         "{} is {} times the density of the fluid: below {LIGHTEST_FREE} times it, free grains become unstable in this coupling",

@@ -154,6 +154,17 @@ pub(super) fn contact(
         let help = "add [fluid] or set lubrication_gap = 0";
         check.fail(&raw.lubrication_gap.span, message, help);
     }
+    // A missing unit makes these lengths a thousand times too large.
+    let diameter = smallest_diameter(grains);
+    let lengths = [("a lubrication gap", Some(&raw.lubrication_gap))];
+    for (what, given) in lengths.into_iter().chain([("a roughness", raw.roughness.as_ref())]) {
+        if let Some(given) = given.filter(|given| given.si > diameter) {
+            let (given_length, diameter) = (length(given.si), length(diameter));
+            let message = format!("{what} of {given_length} is larger than a grain ({diameter})");
+            let help = "give a few per cent of the diameter, with its unit: \"0.1 mm\"";
+            check.fail(&given.span, message, help);
+        }
+    }
     let law = raw.law.value;
     let for_overlap = |overlap| stiffness_for(overlap, grains, fluid, gravity, mesh);
     let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {

@@ -6,7 +6,7 @@ use super::scales::scales;
 use crate::case::located::Located;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawProbe, RawRun, RawStop, RawTime};
-use crate::case::settling::{default_max_step, settled_time_step};
+use crate::case::settling::{default_max_step, floor, settled_time_step};
 use crate::number_format::quantity;
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
@@ -111,7 +111,7 @@ pub(super) fn plan(
         check.fail(&keep.span, "found 0 checkpoints", help);
     }
     let checkpoint_keep = keep.map(|keep| keep.value);
-    let stop = time.stop.as_ref().map(|stop| stop_rule(check, stop, grains));
+    let stop = time.stop.as_ref().map(|stop| stop_rule(check, stop, setup));
     let planes = match &raw.planes {
         Some(planes) => {
             (planes.iter()).filter_map(|raw| plane(check, raw, grains.len(), &setup.mesh)).collect()
@@ -143,7 +143,8 @@ pub(super) fn plan(
     })
 }
 
-fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, grains: &[Grain]) -> Stop {
+fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop {
+    let grains = &setup.grains;
     if raw.hold.si < 0.0 {
         let message = format!("a hold of {}", quantity(raw.hold.si, "s"));
         check.fail(&raw.hold.span, message, "give zero or a positive time");
@@ -155,6 +156,10 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, grains: &[Grain]) -> S
     } else if grains.iter().all(|grain| grain.translation != MotionConstraint::Free) {
         let message = "no grain moves freely, so this never happens";
         check.fail(&raw.span, message, "leave out `stop`");
+    } else if raw.when == StopWhen::Landing && floor(setup).is_none() {
+        let message =
+            "the side of the box to which the grains fall is no wall, so none lands on it";
+        check.fail(&raw.span, message, "leave out `stop`, or close the side with \"wall\"");
     }
     Stop { when: raw.when, hold: raw.hold.si }
 }
