@@ -90,7 +90,8 @@ impl PyStudy {
     /// folder : path-like
     ///     Study folder; it is created.
     /// only : str, optional
-    ///     Runs to execute, in the syntax of ``grainwake study --only``: names, numbers, ranges.
+    ///     Runs to execute, as for ``grainwake study --only``: names with ``*``, ``?`` and sets,
+    ///     separated by commas, or ``"i/N"``, the i-th of N equal shares.
     /// jobs : int, default 1
     ///     Runs at once.
     /// threads : int, default 0

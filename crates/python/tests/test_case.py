@@ -92,7 +92,20 @@ def test_a_problem_of_a_dict_quotes_its_toml():
     assert 'cell_size = "0.1 kg"' in str(refused.value)
 
 
+def endless():
+    tables = {}
+    tables["time"] = tables
+    return tables
+
+
+class Twin:
+    def tolist(self):
+        return self
+
+
 @pytest.mark.parametrize("tables, words", [
+    (endless(), "more than 32 lists or dicts inside each other"),
+    ({"time": {"end": Twin()}}, "time.end: found a value of type Twin"),
     ({"time": {"end": object()}}, "time.end: found a value of type object"),
     ({"time": {"end": [1, None]}}, "time.end.1: found None"),
     ({"time": {1: 2}}, "time: the key 1 is not a string"),
@@ -107,6 +120,16 @@ def test_a_value_without_toml_is_refused(tables, words):
 def test_a_table_that_is_no_dict_is_refused():
     with pytest.raises(gw.CaseError, match="time: found a value of type int; expected a dict"):
         gw.Case.new(size=["4 mm"] * 3, cell_size="1 mm", end="1 s", time=3)
+
+
+@pytest.mark.parametrize("more, words", [
+    ({"domain": {"cells": [2, 2, 2]}}, "domain: its keys are arguments"),
+    ({"time": {"end": 9}}, "time.end: given beside the argument end"),
+    ({"grain": [], "grains": []}, "grain: given beside grains"),
+])
+def test_a_table_does_not_replace_arguments(more, words):
+    with pytest.raises(gw.CaseError, match=words):
+        gw.Case.new(size=["4 mm"] * 3, cell_size="1 mm", end="1 s", **more)
 
 
 def test_a_case_of_keywords():

@@ -201,8 +201,12 @@ def test_a_scan_of_several_grains():
     assert list(scan.rejected) == [9]
     assert scan.voxels[4] == (image == 4).sum()
     assert scan[4].volume > scan[7].volume
-    with pytest.raises(KeyError, match="label 9"):
-        scan[9]
+    for label in (9, -1):
+        with pytest.raises(KeyError, match=f"label {label}"):
+            scan[label]
+    assert list(scan) == [4, 7] and 7 in scan and 9 not in scan and "x" not in scan
+    with pytest.raises(gw.CaseError, match="cells = 0"):
+        gw.scan(image, voxel="0.1 mm", cells=0)
     with pytest.raises(gw.CaseError, match="holds 3 grains"):
         gw.Grain.from_scan(image, voxel="0.1 mm", roundness=False)
     one = gw.Grain.from_scan(image, voxel="0.1 mm", label=7, roundness=False)
@@ -217,6 +221,16 @@ def test_grey_images_need_a_threshold():
     assert 1 < scan.threshold < 3 and len(scan) == 1
     with pytest.raises(gw.CaseError, match='found "mean"'):
         gw.scan(image, voxel="50 um", threshold="mean")
+
+
+def test_voxels_without_a_value_are_refused():
+    image = ball().astype(np.float32)
+    masked = np.ma.masked_less(image, 0.5)
+    with pytest.raises(gw.CaseError, match="masked array"):
+        gw.scan(masked, voxel="50 um", threshold=0.5)
+    image[3, 4, 5] = np.nan
+    with pytest.raises(gw.CaseError, match=r"found NaN at the voxel \[3, 4, 5\]"):
+        gw.scan(image, voxel="50 um", threshold=0.5)
 
 
 def test_a_stated_voxel_size_is_compared(tmp_path):

@@ -127,6 +127,8 @@ def test_wrong_folders_and_calls_are_refused(case_file, case, run, tmp_path):
             call()
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "notes.txt").write_text("notes")
+    with pytest.raises(gw.CaseError, match="give one of them"):
+        gw.Simulation(case, output=tmp_path / "new", force=True, resume=True)
     for more in ({}, {"force": True}):
         with pytest.raises(gw.CaseError, match="mine.*holds no run of this program"):
             gw.Simulation(case, output=tmp_path / "mine", **more)

@@ -251,6 +251,11 @@ def test_wrong_control_is_refused(sim):
         sim.set_velocity(0, velocity=[0, 0])
     with pytest.raises(gw.CaseError, match="give velocity, angular_velocity or both"):
         sim.prescribe_motion(0)
+    sim.prescribe_motion(0, angular_velocity=[0, 0, 1])
+    before = sim.state()
+    with pytest.raises(gw.CaseError, match="prescribed"):
+        sim.set_velocity(0, [0, 0, -0.05], [1, 0, 0])
+    assert (sim.state().velocities == before.velocities).all()
     sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
 
 
@@ -322,6 +327,8 @@ def test_failed_numerics_raise_solver_error(case_file):
         sim.advance_to("1 s")
     with pytest.raises(gw.SolverError, match="cannot be continued"):
         sim.step()
+    with pytest.raises(gw.SolverError, match="cannot be continued"):
+        sim.save_checkpoint(case_file.with_name("failed.state"))
 
 
 def test_the_lock_of_the_interpreter_is_released(case_file):

@@ -56,6 +56,16 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
             listing(&suites)
         });
     }
+    let runs = |name: &String| {
+        let all = suites.iter().flat_map(|suite| suite.runs.iter().map(move |run| (suite, run)));
+        let mut named = all.filter(|(suite, run)| {
+            suite.name == *name || format!("{}/{}", suite.name, run.name) == *name
+        });
+        named.any(|(_, run)| run.level <= level)
+    };
+    if let Some(name) = args.names.iter().find(|name| !runs(name)) {
+        return Err(Exit::refused(format!("\"{name}\" is of the level full"), "add --level full"));
+    }
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
     let started = std::time::Instant::now();

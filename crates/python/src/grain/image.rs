@@ -11,7 +11,7 @@ use grainwake_shape::{ReadLimits, ShapeError};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyIterator, PyString};
 
 use super::PyGrain;
 use super::build::{options, sized};
@@ -61,11 +61,19 @@ impl PyScan {
     fn __len__(&self) -> usize {
         self.grains.len()
     }
-    fn __getitem__(&self, py: Python<'_>, label: u32) -> PyResult<Py<PyGrain>> {
-        if let Some(grain) = self.grains.get(&label) {
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        self.grains(py)?.try_iter()
+    }
+    fn __contains__(&self, label: &Bound<'_, PyAny>) -> bool {
+        label.extract().is_ok_and(|label: u32| self.grains.contains_key(&label))
+    }
+    fn __getitem__(&self, py: Python<'_>, label: i64) -> PyResult<Py<PyGrain>> {
+        let known = u32::try_from(label).ok();
+        if let Some(grain) = known.and_then(|label| self.grains.get(&label)) {
             return Ok(grain.clone_ref(py));
         }
-        let why = self.rejected.get(&label).map_or("no voxel has it", String::as_str);
+        let rejected = known.and_then(|label| self.rejected.get(&label));
+        let why = rejected.map_or("no voxel has it", String::as_str);
         Err(pyo3::exceptions::PyKeyError::new_err(format!("label {label}: {why}")))
     }
     fn __repr__(&self) -> String {
