@@ -18,7 +18,7 @@ use crate::run_folder::checkpoint::Record;
 use crate::run_folder::lock::Lock;
 use crate::run_folder::provenance::{ParentRun, Provenance, Session};
 use crate::run_folder::{
-    self, Content, Existing, ExtraTable, Parent, RESOLVED, checkpoint, differing,
+    self, Content, Existing, ExtraTable, Parent, RESOLVED, checkpoint, differing, remove_if_there,
 };
 
 /// Run folder that is locked and may be written.
@@ -107,6 +107,7 @@ impl Opened {
             run_folder::clear(&out)?;
         }
         run_folder::create(&out)?;
+        remove_if_there(&out.join(checkpoint::REMOVAL), disk::remove_file)?;
         let session = Session::now(&options.command, options.threads, sim.steps());
         self.provenance.sessions.push(session);
         self.provenance.write(&out)?;

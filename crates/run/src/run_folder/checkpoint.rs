@@ -31,6 +31,8 @@ const VERSION: u32 = 5;
 const CHECKSUM: u64 = 32;
 /// Folder of the checkpoints in a run folder.
 pub const FOLDER: &str = "checkpoint";
+/// Name of the file that marks a folder whose run is being removed.
+pub const REMOVAL: &str = ".removal";
 
 /// State of a run besides the simulation. It holds no wall-clock time: two runs of a case write
 /// identical bytes.
@@ -257,7 +259,8 @@ pub(crate) fn restore(
             Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
         }
     }
-    if reasons.is_empty() && (run.join(summary::FILE).exists() || tables::go_on(run)) {
+    let has_results = run.join(summary::FILE).exists() || tables::go_on(run);
+    if reasons.is_empty() && has_results && !run.join(REMOVAL).exists() {
         reasons.push("the folder has none; they may have been removed".to_owned());
     }
     if reasons.is_empty() {

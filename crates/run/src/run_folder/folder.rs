@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_formats::disk::{self, is_temporary};
+use grainwake_formats::disk::{self, is_temporary, write_atomically};
 use grainwake_formats::{contacts, probes, summary};
 
 use super::checkpoint;
@@ -184,11 +184,20 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // An interrupted removal can be repeated: the summary, which marks a finished run, goes first,
     // then the checkpoints, which refer to the other files. The provenance marks a run folder and
-    // goes last.
+    // goes last. A mark tells tables without checkpoints from those whose checkpoints were lost.
     remove_if_there(&folder.join(summary::FILE), disk::remove_file)?;
+    let mark = folder.join(checkpoint::REMOVAL);
+    write_atomically(&mark, true, |_| Ok(())).context("write", &mark)?;
     remove_if_there(&folder.join(checkpoint::FOLDER), disk::remove_folder)?;
-    let files =
-        [contacts::FILE, "failure.json", "run.pvd", "report.html", RESOLVED, provenance::FILE];
+    let files = [
+        contacts::FILE,
+        "failure.json",
+        "run.pvd",
+        "report.html",
+        RESOLVED,
+        checkpoint::REMOVAL,
+        provenance::FILE,
+    ];
     let folders = [probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
         remove_if_there(&folder.join(name), disk::remove_folder)?;
