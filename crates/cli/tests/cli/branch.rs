@@ -154,8 +154,15 @@ fn an_interrupted_branch_resumes_to_the_same_bits() {
     for checkpoint in std::fs::read_dir(parted.join("checkpoint")).unwrap() {
         std::fs::remove_file(checkpoint.unwrap().path()).unwrap();
     }
-    std::fs::remove_file(parted.join("summary.json")).unwrap();
+    // The results of a run whose checkpoints were removed stay.
     let alone = [&job[2..4], &["--resume"]].concat();
+    for job in [&alone[..], &job] {
+        run(&case, &parted, &[job, &["--set", "time.end=160 ms"]].concat()).code(4);
+    }
+    // A run that was interrupted before its first checkpoint has none.
+    for file in ["summary.json", "grains.csv", "diagnostics.csv", "events.jsonl"] {
+        std::fs::remove_file(parted.join(file)).unwrap();
+    }
     let refused = message(&run(&case, &parted, &alone).code(2));
     assert!(refused.contains("has no checkpoint yet") && refused.contains("--from"), "{refused}");
     // With the parent named, the job starts again.
