@@ -32,7 +32,7 @@ pub fn _validate<'py>(
         }
     };
     let library = Library::open(suites.as_deref()).raise()?;
-    let suites = library.chosen(&names).raise()?;
+    let suites = library.chosen(&names, Some(level)).raise()?;
     let threads = threads::resolve(py, threads)?;
     let mut results = Vec::new();
     for suite in &suites {

@@ -332,6 +332,8 @@ def test_a_validation_has_the_columns_of_the_command_line(root, tmp_path):
     assert table["pass"].all() and len(table) > 0
     with pytest.raises(gw.CaseError, match='there is no validation "x"'):
         gw.validate("x", suites=root / "validation", output=tmp_path)
+    with pytest.raises(gw.CaseError, match='"rotation/spin-d16" is of the level full'):
+        gw.validate("rotation/spin-d16", suites=root / "validation", output=tmp_path)
     with pytest.raises(gw.CaseError, match='"rotation" has no run "x"'):
         gw.validate("rotation/x", suites=root / "validation", output=tmp_path)
 

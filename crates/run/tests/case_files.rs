@@ -196,6 +196,7 @@ fn text_that_is_not_toml_is_named() {
     let message = |text: &str| problems(text)[0].to_string();
     assert!(message("{\"fluid\": 1}").contains("case.toml is JSON"), "{}", message("{}"));
     assert!(message("solid\0\u{1}").contains("is not a file of text"), "{}", message("\0"));
+    good(&format!("# grain\u{92}s\n{PAIR}"));
     let twice = problems("[grain]\ndensity = 1\n[grain]\ndensity = 2\n");
     assert!(twice[0].help.as_ref().unwrap().contains("[[grain]]"), "{:?}", twice[0].help);
 }

@@ -7,6 +7,7 @@ use flate2::read::DeflateDecoder;
 use grainwake_run::case::{Problem, did_you_mean};
 use tempfile::TempDir;
 
+use crate::check::Level;
 use crate::suite::{Suite, SuiteError};
 
 /// Files of the suites in the program: path below the folder of the suites, and length [bytes].
@@ -72,11 +73,12 @@ impl Library {
     }
 
     /// Returns the suites and runs with the given names, NAME or NAME/RUN, with the runs that these
-    /// refer to; all without names.
+    /// refer to; all without names. `level` is that of the runs to be executed, if any.
     ///
     /// # Errors
-    /// There are no suites, or a name is not known; the remedy lists the known ones.
-    pub fn chosen(&self, names: &[String]) -> Result<Vec<Suite>, SuiteError> {
+    /// There are no suites, or a name is not known (the remedy lists the known ones) or has no run
+    /// of the level.
+    pub fn chosen(&self, names: &[String], level: Option<Level>) -> Result<Vec<Suite>, SuiteError> {
         if self.suites.is_empty() {
             let message = "there is no validation in the folder of the suites";
             let help =
@@ -97,6 +99,14 @@ impl Library {
             if let Some(run) = run.filter(|run| !runs.clone().any(|known| known == *run)) {
                 let message = format!("the validation \"{suite_name}\" has no run \"{run}\"");
                 return Err(unknown(message, run, "It has", runs.collect()));
+            }
+            let mut named =
+                suite.runs.iter().filter(|known| run.is_none_or(|run| known.name == run));
+            if level.is_some_and(|level| named.all(|run| run.level > level)) {
+                let message = format!("\"{name}\" is of the level full");
+                return Err(Problem::new(message)
+                    .help("give it: --level full, in Python level=\"full\"")
+                    .into());
             }
         }
         let chosen = self.suites.iter().cloned().map(|suite| {
@@ -156,8 +166,8 @@ mod tests {
     #[test]
     fn names_choose_suites_and_runs_with_their_references() {
         let library = Library::embedded().unwrap();
-        let chosen = |name: &str| library.chosen(&[name.to_string()]);
-        let all = library.chosen(&[]).unwrap();
+        let chosen = |name: &str| library.chosen(&[name.to_string()], Some(Level::Ci));
+        let all = library.chosen(&[], None).unwrap();
         assert_eq!(describe_runs(&all), describe_runs(&library.suites));
         let rotation = chosen("rotation").unwrap();
         assert!(rotation.len() == 1 && rotation[0].runs.len() > 1);
@@ -168,6 +178,7 @@ mod tests {
             ("rotaton", "there is no validation \"rotaton\"", "\"rotation\""),
             ("x/y", "there is no validation \"x\"", "There are: array, "),
             ("rotation/", "the validation \"rotation\" has no run \"\"", "It has: "),
+            ("rotation/spin-d16", "is of the level full", "--level full"),
             ("rotation/spin-d9", "has no run \"spin-d9\"", "\"spin-d8\""),
         ] {
             let SuiteError::Invalid(problem) = chosen(name).unwrap_err() else { panic!("{name}") };
@@ -175,7 +186,7 @@ mod tests {
             assert!(problem.help.as_ref().unwrap().contains(help), "{:?}", problem.help);
         }
         let empty = Library { suites: Vec::new(), _unpacked: None };
-        let message = empty.chosen(&[]).unwrap_err().to_string();
+        let message = empty.chosen(&[], None).unwrap_err().to_string();
         assert!(message.contains("no validation in the folder"), "{message}");
     }
 

@@ -41,30 +41,20 @@ impl From<SuiteError> for Exit {
 /// Runs validations and prints the deviation of each value from its reference.
 pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let library = Library::open(args.suites.as_deref())?;
-    let mut suites = library.chosen(&args.names)?;
-    for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
-        run.set.extend(args.overrides.list());
-    }
     let level = match args.level.as_str() {
         "full" => Level::Full,
         _ => Level::Ci,
     };
+    let mut suites = library.chosen(&args.names, (!args.list).then_some(level))?;
+    for run in suites.iter_mut().flat_map(|suite| &mut suite.runs) {
+        run.set.extend(args.overrides.list());
+    }
     if args.list {
         return print(&if args.json {
             serde_json::to_string_pretty(&listed(&suites))?
         } else {
             listing(&suites)
         });
-    }
-    let runs = |name: &String| {
-        let all = suites.iter().flat_map(|suite| suite.runs.iter().map(move |run| (suite, run)));
-        let mut named = all.filter(|(suite, run)| {
-            suite.name == *name || format!("{}/{}", suite.name, run.name) == *name
-        });
-        named.any(|(_, run)| run.level <= level)
-    };
-    if let Some(name) = args.names.iter().find(|name| !runs(name)) {
-        return Err(Exit::refused(format!("\"{name}\" is of the level full"), "add --level full"));
     }
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());

@@ -246,7 +246,7 @@ fn runs_of_another_program_can_be_judged_but_not_those_of_another_case() {
 fn wrong_names_and_keys_are_exit_code_2() {
     let (folder, suite) = suites(SUITE);
     validate(folder.path(), &["fal"]).code(2).stderr(contains("did you mean \"fall\""));
-    validate(folder.path(), &["fall/slow"]).code(2).stderr(contains("--level full"));
+    validate(folder.path(), &["fall/slow"]).code(2).stderr(contains("of the level full"));
     validate(folder.path(), &["--suites", "nowhere"]).code(2).stderr(contains("--suites"));
     for (from, to, word) in [
         ("take = \"last\"", "take = \"latest\"", "last"),

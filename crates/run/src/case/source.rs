@@ -252,7 +252,7 @@ impl Source {
 
 /// Refuses text of another kind than TOML, for which the messages of its reader make no sense.
 fn admit(name: &str, text: &str) -> Result<(), Problem> {
-    let is_binary = text.chars().any(|c| c.is_control() && !c.is_whitespace());
+    let is_binary = text.chars().any(|c| c.is_ascii_control() && !c.is_whitespace());
     let is_json = text.trim_start().starts_with('{');
     if !is_binary && !is_json {
         return Ok(());

@@ -19,6 +19,7 @@ use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::TrackerState;
 
 use super::ExtraTable;
+use super::provenance::Provenance;
 use super::tables::{self, Lengths};
 use crate::contact_events::{PairEvents, WallEvents};
 use crate::contact_work::ContactWork;
@@ -259,7 +260,9 @@ pub(crate) fn restore(
             Err(reason) => reasons.push(format!("{}: {reason}", path.display())),
         }
     }
-    let has_results = run.join(summary::FILE).exists() || tables::go_on(run);
+    // A checkpoint after a step writes its cost into the provenance.
+    let has_stepped = Provenance::read(run).is_some_and(|own| own.cost().wall_s > 0.0);
+    let has_results = run.join(summary::FILE).exists() || has_stepped || tables::go_on(run);
     if reasons.is_empty() && has_results && !run.join(REMOVAL).exists() {
         reasons.push("the folder has none; they may have been removed".to_owned());
     }

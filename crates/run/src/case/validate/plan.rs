@@ -157,8 +157,7 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop
         let message = "no grain moves freely, so this never happens";
         check.fail(&raw.span, message, "leave out `stop`");
     } else if raw.when == StopWhen::Landing && floor(setup).is_none() {
-        let message =
-            "the side of the box to which the grains fall is no wall, so none lands on it";
+        let message = "the side to which the grains fall or rise is no wall, so none lands on it";
         check.fail(&raw.span, message, "leave out `stop`, or close the side with \"wall\"");
     }
     Stop { when: raw.when, hold: raw.hold.si }
