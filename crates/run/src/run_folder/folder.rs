@@ -91,7 +91,8 @@ fn content(folder: &Path) -> Result<Content, RunError> {
     // A run killed right after its start leaves at most empty folders and temporary files.
     let foreign = entries.flatten().any(|entry| {
         let empty = std::fs::read_dir(entry.path()).is_ok_and(|mut inside| inside.next().is_none());
-        !empty && !is_temporary(&entry.path()) && entry.file_name() != lock::FILE
+        let own = [lock::FILE, checkpoint::REMOVAL].iter().any(|own| entry.file_name() == *own);
+        !empty && !is_temporary(&entry.path()) && !own
     });
     Ok(if foreign { Content::Foreign } else { Content::Empty })
 }
@@ -184,7 +185,7 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // An interrupted removal can be repeated: the summary, which marks a finished run, goes first,
     // then the checkpoints, which refer to the other files. The provenance marks a run folder and
-    // goes last. A mark tells tables without checkpoints from those whose checkpoints were lost.
+    // goes last but one. A mark tells tables without checkpoints from those whose checkpoints were lost.
     remove_if_there(&folder.join(summary::FILE), disk::remove_file)?;
     let mark = folder.join(checkpoint::REMOVAL);
     write_atomically(&mark, true, |_| Ok(())).context("write", &mark)?;
@@ -195,8 +196,8 @@ pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
         "run.pvd",
         "report.html",
         RESOLVED,
-        checkpoint::REMOVAL,
         provenance::FILE,
+        checkpoint::REMOVAL,
     ];
     let folders = [probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
