@@ -185,7 +185,8 @@ pub(crate) fn lock_folder(folder: &Path) -> Result<Lock, RunError> {
 pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
     // An interrupted removal can be repeated: the summary, which marks a finished run, goes first,
     // then the checkpoints, which refer to the other files. The provenance marks a run folder and
-    // goes last but one. A mark tells tables without checkpoints from those whose checkpoints were lost.
+    // goes last but one. A mark tells tables without checkpoints from those whose checkpoints were
+    // lost.
     remove_if_there(&folder.join(summary::FILE), disk::remove_file)?;
     let mark = folder.join(checkpoint::REMOVAL);
     write_atomically(&mark, true, |_| Ok(())).context("write", &mark)?;
