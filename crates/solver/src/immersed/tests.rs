@@ -9,6 +9,8 @@ use crate::flow::{Boundaries, Boundary, Flow, FluidParams, NestedFlow};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
 
+mod stagnation;
+
 const DT: f64 = 0.004;
 
 /// Two isolated grains in a shear flow, one of them across a periodic edge.
