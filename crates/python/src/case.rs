@@ -212,10 +212,12 @@ impl PyCase {
                                    case with other keys is made by from_dict";
                     return Err(input(message));
                 }
-                "grain" if grains.is_some() => return Err(input("grain: given beside grains")),
+                "grain" if grains.is_some() => {
+                    return Err(input("grain: found beside grains; give one of them"));
+                }
                 "time" => match table.cast::<PyDict>() {
                     Ok(more) if more.contains("end")? => {
-                        return Err(input("time.end: given beside the argument end"));
+                        return Err(input("time.end: found beside end; give one of them"));
                     }
                     Ok(more) => time.update(more.as_mapping())?,
                     Err(_) => {

@@ -124,8 +124,8 @@ def test_a_table_that_is_no_dict_is_refused():
 
 @pytest.mark.parametrize("more, words", [
     ({"domain": {"cells": [2, 2, 2]}}, "domain: its keys are arguments"),
-    ({"time": {"end": 9}}, "time.end: given beside the argument end"),
-    ({"grain": [], "grains": []}, "grain: given beside grains"),
+    ({"time": {"end": 9}}, "time.end: found beside end"),
+    ({"grain": [], "grains": []}, "grain: found beside grains"),
 ])
 def test_a_table_does_not_replace_arguments(more, words):
     with pytest.raises(gw.CaseError, match=words):

@@ -228,7 +228,10 @@ fn values_out_of_range_are_refused() {
     refused("density = 1000", "density = 0", "fluid.density", &["greater than zero"]);
     refused("\"1500 kg/m3\"", "-1500", "grain.0.density", &["greater than zero"]);
     refused("\"1 s\"", "0", "time.end", &["greater than zero"]);
-    refused("\"2 mm\"", "\"-2 mm\"", "grain.0.shape", &["positive"]);
+    refused("\"2 mm\"", "\"-2 mm\"", "grain.0.shape", &["`diameter` is -0.002", "positive"]);
+    let cell = "cell_size = \"0.25 mm\"";
+    let one = "cells = [1, 1, 1]\nboundaries = { x = \"periodic\", y = \"periodic\" }";
+    refused(cell, one, "domain", &["a fluid needs more than one cell"]);
     refused("[time]", "[contact]\nrestitution = 1.5\n[time]", "contact.restitution", &["between"]);
     refused(
         "[time]",

@@ -2,7 +2,7 @@
 
 use crate::distance::Distance;
 use crate::error::{Defect, Result, ShapeError, positive, size, within};
-use crate::field::SampledField;
+use crate::field::{SAMPLES, SampledField};
 use crate::morphology::Morphology;
 use crate::nodes::SurfaceNode;
 use crate::provenance::Provenance;
@@ -92,14 +92,14 @@ impl ShapeOptions {
     /// Error of a body with too many samples, if its thinnest extent asks for them.
     fn too_thin(&self, extent: DVec3) -> Option<ShapeError> {
         let cells = self.cells.unwrap_or(DEFAULT_CELLS);
-        let ratio = extent.max_element() / extent.min_element();
+        let ratio = (extent.max_element() / extent.min_element()).round();
         (self.thinnest_spacing(extent) < extent.max_element() / cells as f64).then(|| {
             let reason = format!(
-                "too flat or too long; {} cells across its thinnest extent need too many samples, \
-                 make it thicker",
+                "too flat or too long: {} cells across the thinnest extent need too many samples; \
+                 make the body thicker",
                 self.least_cells
             );
-            ShapeError::parameter("longest over thinnest extent of the body", ratio, &reason)
+            ShapeError::parameter("longest over thinnest extent", ratio, &reason)
         })
     }
 }
@@ -115,7 +115,10 @@ pub(crate) fn assemble<D: Distance>(
     let spacing = options.spacing(extent)?;
     let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
     let sampled = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin);
-    let mut field = sampled.map_err(|error| options.too_thin(extent).unwrap_or(error))?;
+    let mut field = sampled.map_err(|error| match error {
+        ShapeError::BadParameter { name: SAMPLES, .. } => options.too_thin(extent).unwrap_or(error),
+        _ => error,
+    })?;
     let scanned = matches!(body.surface, roundness::Surface::Scanned { .. });
     let removed = specks::remove(&mut field, scanned);
     if removed > 0.0 {

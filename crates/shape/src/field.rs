@@ -33,11 +33,13 @@ pub struct SampledField {
     levels: Vec<f32>,
 }
 
+/// Name of the number of samples in errors.
+pub(crate) const SAMPLES: &str = "samples of the distance field";
+
 /// Refuses a number of samples above the maximum.
 fn affordable(samples: f64) -> Result<()> {
-    let name = "samples of the distance field";
     let reason = "too many; ask for fewer cells across the grain";
-    within(name, samples, 0.0..=MAX_SAMPLES as f64, reason)
+    within(SAMPLES, samples, 0.0..=MAX_SAMPLES as f64, reason)
 }
 
 /// The cell that contains a point, with the position of the point in it.

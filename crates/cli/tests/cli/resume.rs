@@ -460,6 +460,26 @@ fn a_folder_of_something_else_is_never_touched() {
     assert_eq!(crate::common::contents(folder.path()).len(), 1);
 }
 
+#[test]
+fn the_missing_or_damaged_file_of_a_run_is_named() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.end=2 ms"]).success();
+    let resumed = || {
+        let refused = run(&case, &out, &["--set", "contact.friction=0.1", "--resume"]).code(2);
+        let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        message.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    assert!(resumed().contains("contact.friction"), "{}", resumed());
+    let file = out.join("case.resolved.toml");
+    std::fs::write(&file, "x =").unwrap();
+    assert!(resumed().contains("its case.resolved.toml is damaged"), "{}", resumed());
+    std::fs::remove_file(file).unwrap();
+    assert!(resumed().contains("its case.resolved.toml is missing"), "{}", resumed());
+    std::fs::write(out.join("provenance.json"), "{").unwrap();
+    assert!(resumed().contains("a provenance.json that cannot be read"), "{}", resumed());
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_and_sigterm_write_a_checkpoint_and_exit_with_130() {

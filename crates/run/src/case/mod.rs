@@ -46,7 +46,7 @@ use grainwake_solver::sim::Setup;
 pub use branch::find_parent;
 pub use error::{CaseError, Problem};
 pub use estimate::{Estimate, cells_for_drag_error, drag_error_text};
-pub use exactly::{Exactly, exactly};
+pub use exactly::exactly;
 pub use expect::{Expectation, Verdict};
 pub use located::Located;
 pub use schema::schema;

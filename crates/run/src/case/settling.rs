@@ -58,7 +58,7 @@ fn reynolds_with(galileo: f64, drag: impl Fn(f64) -> f64) -> f64 {
     if wanted <= 0.0 {
         return 0.0;
     }
-    let (mut low, mut high) = (1e-12_f64, 1e15_f64);
+    let (mut low, mut high) = (1e-12_f64, 1e9_f64);
     for _ in 0..200 {
         let middle = (low * high).sqrt();
         if drag(middle) * middle * middle < wanted { low = middle } else { high = middle }

@@ -262,7 +262,8 @@ pub(crate) fn restore(
     }
     // A checkpoint after a step writes its cost into the provenance.
     let has_stepped = Provenance::read(run).is_some_and(|own| own.cost().wall_s > 0.0);
-    let has_results = run.join(summary::FILE).exists() || has_stepped || tables::go_on(run);
+    let has_results =
+        run.join(summary::FILE).exists() || has_stepped || tables::has_later_rows(run);
     if reasons.is_empty() && has_results && !run.join(REMOVAL).exists() {
         reasons.push("the folder has none; they may have been removed".to_owned());
     }

@@ -17,10 +17,6 @@ use crate::number_format::quantity;
 /// Name of the case file with all defaults written out.
 pub const RESOLVED: &str = "case.resolved.toml";
 
-/// Description of a folder whose provenance cannot be read.
-const PROVENANCE_DAMAGED: &str =
-    "holds a run whose provenance.json is damaged, so that its case is not known";
-
 /// Treatment of an existing run in the folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
@@ -106,7 +102,8 @@ pub(crate) fn admit(folder: &Path, existing: Existing) -> Result<Content, RunErr
     let present = content(folder)?;
     match (present, existing) {
         (Content::Foreign, _) if folder.join(provenance::FILE).exists() => {
-            occupied(PROVENANCE_DAMAGED, "give another folder with -o, or remove this one")
+            let what = "holds a provenance.json that cannot be read, so that its run is not known";
+            occupied(what, "give another folder with -o")
         }
         (Content::Foreign, _) => {
             occupied("is not empty and holds no run of this program", "give another folder with -o")

@@ -49,7 +49,7 @@ fn names(extra: &[ExtraTable]) -> impl Iterator<Item = String> {
 }
 
 /// Returns whether the tables in a run folder hold rows after those of the first state.
-pub(super) fn go_on(run: &Path) -> bool {
+pub(super) fn has_later_rows(run: &Path) -> bool {
     File::open(run.join(diagnostics::FILE))
         .is_ok_and(|file| BufReader::new(file).lines().nth(2).is_some())
 }

@@ -167,6 +167,18 @@ mod tests {
     }
 
     #[test]
+    fn a_body_with_too_many_samples_is_refused_with_the_cause() {
+        let refused = |size: [f64; 3], options: &ShapeOptions| {
+            rounded_box(size[0], size[1], size[2], 0.0, options).unwrap_err().to_string()
+        };
+        let thin = refused([5e-3, 5e-3, 0.02e-3], &options());
+        assert!(thin.contains("thinnest extent = 250") && thin.contains("make the body"), "{thin}");
+        let fine = ShapeOptions { cells: Some(1000), ..options() };
+        let many = refused([1e-3; 3], &fine);
+        assert!(many.contains("ask for fewer cells"), "{many}");
+    }
+
+    #[test]
     fn cylinders_long_and_flat_are_ordered_by_their_moments() {
         let rod = cylinder(1.0, 6.0, &options()).unwrap();
         close(rod.volume(), 6.0 * PI, 3e-3);

@@ -204,20 +204,18 @@ impl Problems<'_> {
         }
     }
 
-    /// Refuses factors that an earlier axis has too, whose values would be lost.
+    /// Refuses a factor that an earlier axis has too, whose values would be lost.
     fn check_factors_of_others(&mut self, axis: &RawAxis, all: &[RawAxis]) {
-        let of = |axis: &RawAxis| -> BTreeMap<String, Option<Range<usize>>> {
-            let values = axis.values.value.iter().flat_map(|value| &value.factors);
-            values.map(|(name, factor)| (name.clone(), factor.span.clone())).collect()
-        };
-        let earlier = all.iter().take_while(|other| other.name.value != axis.name.value);
-        let earlier: Vec<(&str, _)> =
-            earlier.map(|other| (other.name.value.as_str(), of(other))).collect();
-        for (name, span) in of(axis) {
-            if let Some((other, _)) = earlier.iter().find(|(_, names)| names.contains_key(&name)) {
-                let message = format!("the axis \"{other}\" has the factor \"{name}\" too");
+        for other in all.iter().take_while(|other| other.name.value != axis.name.value) {
+            let is_known = |name: &String| {
+                other.values.value.iter().any(|value| value.factors.contains_key(name))
+            };
+            let mut factors = axis.values.value.iter().flat_map(|value| &value.factors);
+            if let Some((name, factor)) = factors.find(|(name, _)| is_known(name)) {
+                let message =
+                    format!("the axis \"{}\" has the factor \"{name}\" too", other.name.value);
                 let help = "give the factors of different axes different names";
-                self.add(message, help, span.as_ref(), "given twice");
+                self.add(message, help, factor.span.as_ref(), "given twice");
             }
         }
     }

@@ -263,6 +263,15 @@ fn columns_of_the_table_are_no_names_of_axes_and_factors() {
 }
 
 #[test]
+fn two_axes_have_no_factor_in_common() {
+    let twice =
+        STUDY.replace("name = \"rough\", set", "name = \"rough\", factors = { density = 5 }, set");
+    let problem = problems(&twice).remove(0);
+    assert!(problem.to_string().contains("\"weight\" has the factor \"density\" too"), "{problem}");
+    assert_eq!(problem.place().unwrap().1, 15);
+}
+
+#[test]
 fn case_problems_are_located_in_the_study_file() {
     let found = problems(&STUDY.replace("\"contact.friction\" = 0 ", "\"contact.fricton\" = 0 "));
     let p = &found[0];

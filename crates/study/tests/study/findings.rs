@@ -263,6 +263,21 @@ fn claims_of_equality_are_not_in_the_family() {
 }
 
 #[test]
+fn a_claim_of_equality_has_two_levels() {
+    let paper = rows(as_in_the_paper);
+    let parsed = |levels: &str| {
+        let text = format!(
+            "[[claim]]\nsays = \"a\"\nquantity = \"kiss_time\"\n\
+             test.equal = {{ axis = \"orientation\", values = [{levels}], within = 0.05 }}\n"
+        );
+        Analysis::parse("analysis.toml", &text, &models(&paper))
+    };
+    assert!(parsed("\"o2\", \"o4\"").is_ok());
+    let refused = format!("{:?}", parsed("\"o2\", \"o4\", \"o2\"").unwrap_err());
+    assert!(refused.contains("found 3 values, expected a list of 2 values"), "{refused}");
+}
+
+#[test]
 fn correlations_are_listed_by_level() {
     let paper = rows(as_in_the_paper);
     let text = "[correlations]\nquantities = [\"kiss_time\"]\nfactors = [\"sphericity\", \"roundness\"]\nby = \"orientation\"\n";

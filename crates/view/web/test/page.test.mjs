@@ -124,6 +124,19 @@ test("a click on the kiss moves the time", async () => {
   await context.close();
 });
 
+test("an event names its grains if there are more than two", async () => {
+  const names = async (name) => {
+    const { page, context } = await open(chrome, url(name));
+    const [text] = await page.locator(".chip.kiss").allTextContents();
+    await context.close();
+    return text;
+  };
+  const spheres = manySpheres(5, 3);
+  appendFileSync(join(spheres, "events.jsonl"), '{"time":0.01,"event":"kiss","grains":[1,3],"confirmed":0.01}\n');
+  assert.match(await names(save("events.html", spheres)), /^kiss of 1 and 3/);
+  assert.match(await names(saved), /^kiss(?! of)/);
+});
+
 test("grains are where the table says they are", async () => {
   const rows = table();
   const times = [...new Set(rows.map((row) => row.time))];

@@ -95,6 +95,6 @@ pub fn provenance(folder: &Path) {
     write(
         folder,
         "provenance.json",
-        "{\"program\":\"grainwake\",\"version\":\"0.1.0\",\"commit\":\"0123abc\",\"case_sha256\":\"00ff\",\"sessions\":[{\"started\":\"2026-11-21T04:30:00+00:00\",\"command\":[\"grainwake\",\"run\",\"cases/dkt-pair/case.toml\"],\"cpu\":\"some cpu\",\"system\":\"linux x86_64\",\"threads\":2,\"from_step\":0,\"wall_s\":1234.5}]}",
+        "{\"program\":\"grainwake\",\"version\":\"0.1.0\",\"commit\":\"0123abc\",\"case_sha256\":\"00ff\",\"sessions\":[{\"started\":\"2026-11-21T04:30:00+00:00\",\"command\":[\"grainwake\",\"run\",\"cases/dkt-pair/case.toml\"],\"cpu\":\"some cpu\",\"system\":\"linux x86_64\",\"threads\":2,\"from_step\":0,\"wall_s\":1234.5,\"passes\":[{\"name\":\"predict\",\"wall_s\":1000,\"cpu_s\":2000},{\"name\":\"output\",\"wall_s\":2,\"cpu_s\":2}]}]}",
     );
 }

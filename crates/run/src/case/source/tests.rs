@@ -115,6 +115,10 @@ fn kinds_of_values_have_plain_names() {
         ("grain.0.file=true", "found true, expected text in quotes"),
         ("grain.0.orientation=[1, 2, \"a\", 3]", "the text \"a\", expected a number"),
         ("domain.cells=[5, 5]", "found 2 values, expected a list of 3 values"),
+        ("domain.cells=[5, 5, 5, 5]", "found 4 values, expected a list of 3 values"),
+        ("domain.cell_size=[1, 1, 1, 1]", "found 4 values, expected a list of 3 values"),
+        ("domain.boundaries.x=['wall', 'wall', 'slip']", "found 3 values, expected a list of 2"),
+        ("grain.0.shape.exponents=[1, 1, 5]", "found 3 values, expected a list of 2 values"),
         ("fluid.advection=3", "expected text in quotes"),
     ] {
         let p = problem(CASE, &[set]);

@@ -1,8 +1,8 @@
 //! Stagnation-point flow with a boundary layer of given thickness: a manufactured solution around a
 //! sphere, held or carried over the grid.
 //!
-//! The velocity relative to the sphere is u = curl curl (g e_z), with g a function of the distance r
-//! from the centre. With G = g'/r,
+//! The velocity relative to the sphere is u = curl curl (g e_z), with g a function of the distance
+//! r from the centre. With G = g'/r,
 //!
 //! - u = (z G'/r) x - (2 G + r G') e_z,
 //! - G = -(a/2) (t - delta (1 - exp(-t / delta))) C, where t = r - R.
@@ -11,9 +11,9 @@
 //! flow: an inviscid strain of rate a outside a layer of thickness delta, with the viscosity
 //! nu = a delta^2 of Homann's layer. C = exp(-(t / w)^2) ends the flow before the sides of the box.
 //!
-//! The acceleration f = (u . grad) u - nu lap u + grad p, with p = Q z, makes u a steady solution. The
-//! function Q of r is such that f vanishes at the surface. The shear and the pressure there give
-//! the force on the sphere in closed form.
+//! The acceleration f = (u . grad) u - nu lap u + grad p, with p = Q z, makes u a steady solution.
+//! The function Q of r is such that f vanishes at the surface. The shear and the pressure there
+//! give the force on the sphere in closed form.
 
 use super::*;
 use crate::dem::MotionConstraint;
@@ -128,8 +128,8 @@ fn relative(x: DVec3, centre: DVec3) -> DVec3 {
 }
 
 /// Error of the mean force along z over the second half of a run with `cells` across the diameter,
-/// relative to the sum of the magnitudes of shear and pressure. The layer has the thickness `delta`;
-/// sphere and flow move at `carried`.
+/// relative to the sum of the magnitudes of shear and pressure. The layer has the thickness
+/// `delta`; sphere and flow move at `carried`.
 fn force_error(delta: f64, cells: usize, carried: DVec3) -> f64 {
     let solution = Solution::new(delta);
     let h = 2.0 * RADIUS / cells as f64;
