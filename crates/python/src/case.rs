@@ -263,7 +263,7 @@ impl PyCase {
     ///     Draw figures and ``report.html``.
     /// progress : bool or callable, optional
     ///     True shows a bar, False none; by default a bar in terminals and notebooks. A callable
-    ///     receives a dict with time, end, steps, wall_s, dt, gap, phase and contacts.
+    ///     receives a dict with time, end, start, steps, wall_s, dt, gap, phase and contacts.
     ///
     /// Returns
     /// -------

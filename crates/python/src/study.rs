@@ -23,24 +23,34 @@ pub struct PyStudy {
     plan: Plan,
 }
 
+/// State of a study that its thread shares with that of Python.
+#[derive(Default)]
+struct Shared {
+    /// Runs that have ended.
+    ended: usize,
+    messages: Vec<String>,
+}
+
 /// Observer that collects messages for the thread of Python.
 struct Relay<'a> {
     plan: &'a Plan,
-    messages: &'a Mutex<Vec<String>>,
+    shared: &'a Mutex<Shared>,
     stop: &'a AtomicBool,
 }
 
 impl Relay<'_> {
-    fn tell(&self, run: usize, text: &str) {
+    fn tell(&self, run: usize, text: &str, ended: bool) {
         let message = format!("{}: {text}", self.plan.runs[run].name);
-        self.messages.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+        let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.messages.push(message);
+        shared.ended += usize::from(ended);
     }
 }
 
 impl StudyObserver for Relay<'_> {
     fn progress(&self, _: usize, _: &Progress) {}
     fn note(&self, run: usize, text: &str) {
-        self.tell(run, text);
+        self.tell(run, text, false);
     }
     fn ended(&self, run: usize, outcome: &Outcome) {
         let text = match outcome {
@@ -50,7 +60,7 @@ impl StudyObserver for Relay<'_> {
             Outcome::Interrupted => "interrupted",
             Outcome::Locked => "locked by another program",
         };
-        self.tell(run, text);
+        self.tell(run, text, true);
     }
     fn interrupted(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
@@ -146,19 +156,21 @@ impl PyStudy {
             keep_checkpoints,
             command: running::command(py)?,
         };
-        let (messages, stop) = (Mutex::new(Vec::new()), AtomicBool::new(false));
+        let (shared, stop) = (Mutex::new(Shared::default()), AtomicBool::new(false));
         let display =
             py.import("grainwake._progress")?.call_method1("of_study", (progress, chosen.len()))?;
         let work = || {
-            let relay = Relay { plan, messages: &messages, stop: &stop };
+            let relay = Relay { plan, shared: &shared, stop: &stop };
             execute(&plan.runs, &chosen, &folder, &options, &relay)
         };
         let show = |_: Python<'_>| -> PyResult<()> {
-            let new = std::mem::take(&mut *messages.lock().unwrap_or_else(PoisonError::into_inner));
+            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            let (new, ended) = (std::mem::take(&mut shared.messages), shared.ended);
+            drop(shared);
             if new.is_empty() {
                 return Ok(());
             }
-            display.call_method1("update", (new,)).map(drop)
+            display.call_method1("update", (new, ended)).map(drop)
         };
         let ended = running::attended(py, &stop, work, show);
         display.call_method0("close")?;

@@ -326,6 +326,23 @@ values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}
         gw.Study.load(study_file)
 
 
+def test_a_failed_run_of_a_study_is_done(case_file, tmp_path):
+    study_file = tmp_path / "study.toml"
+    study_file.write_text(f"""
+base = "{case_file}"
+[[axis]]
+name = "step"
+key = "time.step"
+values = [{{ name = "long", value = "20 ms", set = {{ "time.end" = "1 s" }} }}]
+""")
+    seen = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", gw.CaseWarning)
+        with pytest.raises(gw.SolverError, match="1 of 1 runs failed"):
+            gw.Study.load(study_file).run(tmp_path / "study", progress=seen.append)
+    assert seen[-1]["done"] == 1
+
+
 def test_a_validation_has_the_columns_of_the_command_line(root, tmp_path):
     table = gw.validate("rotation/spin-d8", suites=root / "validation", output=tmp_path, progress=False)
     assert {"name", "run", "quantity", "value", "reference", "pass"} <= set(table.columns)

@@ -387,6 +387,7 @@ def test_progress_goes_to_a_callable(sim, capfd):
     list(sim.run(until="6 ms", every="2 ms", progress=seen.append))
     assert [each["time"] for each in seen] == pytest.approx([2e-3, 4e-3, 6e-3])
     assert seen[-1]["end"] == pytest.approx(6e-3)
+    assert 0.0 < seen[0]["wall_s"] < seen[-1]["wall_s"]
     assert capfd.readouterr().err == ""
     list(sim.run(until="8 ms", every="2 ms", progress=True))
     assert "100 %" in capfd.readouterr().err

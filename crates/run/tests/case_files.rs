@@ -1160,6 +1160,25 @@ fn whole_numbers_of_steps_lead_to_each_output() {
 }
 
 #[test]
+fn prescribed_motions_count_in_the_expected_step() {
+    let moved = |motion: &str| {
+        let grain = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
+        let text = PAIR.replacen(grain, &format!("{grain}\nmotion = {motion}"), 1);
+        assert!(text != PAIR);
+        good(&text)
+    };
+    let step = |motion: &str| moved(motion).estimate(1).time_step_s;
+    let (free, fast) = (good(PAIR).estimate(1).time_step_s, step("{ velocity = [0, 0, 1] }"));
+    // The Courant number of 0.4 at the speed of the fluid beside a sphere.
+    assert!((fast / (0.4 * 0.25e-3 / 1.4) - 1.0).abs() < 0.1 && fast < 0.6 * free, "{fast} {free}");
+    // A sine has 2 / pi of its largest speed on average.
+    let sine = step("{ velocity = { formula = [0, 0, \"sin(200*PI*t)\"] } }");
+    assert!(sine > 1.2 * fast && sine < 1.9 * fast, "{sine} {fast}");
+    let spin = step("{ velocity = \"fixed\", angular_velocity = [0, 0, 1000] }");
+    assert!((spin / fast - 1.0).abs() < 0.1, "{spin}");
+}
+
+#[test]
 fn the_expected_landing_is_that_of_the_study() {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let table = std::fs::read_to_string(root.join("results/dkt-morphology-members/table.csv"));

@@ -104,17 +104,14 @@ class StudyDisplay:
         self._call = choice if callable(choice) else None
         self._bar = _bar(choice)
         self._runs = runs
-        self._done = 0
 
-    def update(self, messages: Sequence[str]) -> None:
-        ended = ("finished", "interrupted", "locked", "failed")
-        self._done += sum(any(word in text for word in ended) for text in messages)
+    def update(self, messages: Sequence[str], done: int) -> None:
         for text in messages:
             _log.info(text)
         if self._call:
-            self._call({"done": self._done, "runs": self._runs, "messages": list(messages)})
+            self._call({"done": done, "runs": self._runs, "messages": list(messages)})
         if self._bar:
-            self._bar.show(min(1.0, self._done / max(1, self._runs)), messages[-1])
+            self._bar.show(done / max(1, self._runs), messages[-1])
 
     def close(self) -> None:
         if self._bar:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time as clock
 from typing import TYPE_CHECKING, Any, Iterable, Iterator
 
 import numpy as np
@@ -74,7 +75,7 @@ def state(sim: Simulation) -> State:
 def states(sim: Simulation, end: float, every: float, choice: _progress.Choice) -> Iterator[State]:
     """States at the multiples of an interval, and at the end or stop condition of the case."""
     display = _progress.of_run(choice)
-    start = sim.time
+    start, began = sim.time, clock.monotonic()
     try:
         yield sim.state()
         index = math.floor(sim.time / every * (1 + _SAME)) + 1
@@ -84,7 +85,9 @@ def states(sim: Simulation, end: float, every: float, choice: _progress.Choice) 
                 time = end
             sim._advance(time)
             index = max(index + 1, math.floor(sim.time / every * (1 + _SAME)) + 1)
-            display.update({"time": sim.time, "end": end, "start": start, "steps": sim.steps})
+            wall_s = clock.monotonic() - began
+            progress = {"time": sim.time, "end": end, "start": start, "steps": sim.steps}
+            display.update({**progress, "wall_s": wall_s})
             yield sim.state()
     finally:
         display.close()

@@ -300,7 +300,7 @@ impl PySimulation {
     /// every : float or str, optional
     ///     Interval of the states [s]; by default the interval of the tables of the case.
     /// progress : bool or callable, optional
-    ///     As in `Case.run`.
+    ///     As in `Case.run`; the dict has time, end, start, steps and wall_s.
     ///
     /// Yields
     /// ------

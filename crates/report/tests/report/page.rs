@@ -132,7 +132,7 @@ fn the_page_stands_alone_and_can_be_read_aloud() {
         "4.00",
         "Reynolds number",
         "0123abc",
-        "predict 16 min 40 s, output 2 s",
+        "predict 16 min 40 s, output 2.00 s",
         "20 min 34 s",
         "role change",
         "session 1, command",

@@ -1,7 +1,7 @@
 //! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall time.
 
-use super::settling::{galileo, settling_reynolds, smallest_diameter, terminal_speed, time_step};
-use super::settling::{impact_speed, is_free, landing_time};
+use super::settling::{expected_time_step, galileo, impact_speed, is_free, landing_time};
+use super::settling::{settling_reynolds, smallest_diameter, terminal_speed};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
 use crate::run_folder::{checkpoint_bytes, output_bytes};
@@ -39,7 +39,7 @@ pub struct Estimate {
     pub expected_end_s: f64,
     /// Steps expected until then.
     pub steps: u64,
-    /// Time step expected at the settling speed [s].
+    /// Time step expected at the settling speed and the speeds of prescribed motions [s].
     pub time_step_s: f64,
     /// Memory expected [bytes].
     pub memory_bytes: u64,
@@ -97,14 +97,14 @@ impl Estimate {
         let galileo = largest.map(|(_, _, galileo)| galileo);
         let speed =
             (largest.zip(fluid)).map(|((_, grain, _), fluid)| terminal_speed(grain, fluid, g));
-        let allowed = time_step(setup, speed.unwrap_or(0.0));
+        let landing = plan.stop.as_ref().filter(|stop| stop.when == StopWhen::Landing);
+        let landing = landing.and_then(|stop| Some(landing_time(setup)? + stop.hold));
+        let expected_end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));
+        let allowed = expected_time_step(setup, speed.unwrap_or(0.0), expected_end_s);
         // Whole numbers of equal steps lead from output to output.
         let interval = plan.intervals().fold(f64::INFINITY, f64::min);
         let steps_of_interval = (interval / allowed - 1e-9).ceil().max(1.0);
         let time_step_s = if interval.is_finite() { interval / steps_of_interval } else { allowed };
-        let landing = plan.stop.as_ref().filter(|stop| stop.when == StopWhen::Landing);
-        let landing = landing.and_then(|stop| Some(landing_time(setup)? + stop.hold));
-        let expected_end_s = landing.map_or(plan.end, |landing| landing.min(plan.end));
         let steps = (expected_end_s / time_step_s).ceil().max(1.0);
 
         let cells = setup.mesh.cell_count();

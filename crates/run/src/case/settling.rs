@@ -10,6 +10,8 @@ use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::EventParams;
 use grainwake_solver::sim::{Setup, StepRule};
 
+const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
+
 /// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
 /// At a tenth of this ratio some grains become unstable.
 pub(super) const LIGHTEST_FREE: f64 = 0.01;
@@ -165,6 +167,35 @@ pub(super) fn settled_time_step(setup: &Setup) -> f64 {
         speeds.fold(0.0, f64::max)
     });
     time_step(setup, speed)
+}
+
+/// Returns the mean step expected of a run until `end` [s], at the `settling` speed [m/s] or the
+/// speeds of grains with prescribed motion.
+pub(super) fn expected_time_step(setup: &Setup, settling: f64, end: f64) -> f64 {
+    let speeds = prescribed_speeds(setup, end);
+    let per_second = |speed: &f64| 1.0 / time_step(setup, speed.max(settling));
+    speeds.len() as f64 / speeds.iter().map(per_second).sum::<f64>()
+}
+
+/// Returns the largest speed of the grains with prescribed motion [m/s] at times spread over the
+/// run until `end` [s]; at one time, if no motion is a formula.
+pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
+    let times = if setup.prescription.motions.is_empty() { 1 } else { 200 };
+    let mut driven: Vec<Grain> = setup.grains.clone();
+    let speed = |constraint: MotionConstraint| match constraint {
+        MotionConstraint::Prescribed(velocity) => velocity.length(),
+        MotionConstraint::Free => 0.0,
+    };
+    let at = |n: usize| {
+        // Multiples of the golden ratio keep in step with no period of a motion.
+        let time = (0.5 + n as f64 * GOLDEN_RATIO).fract() * end;
+        setup.prescription.prescribe_motion(&mut driven, time);
+        let of = |grain: &Grain| {
+            speed(grain.translation) + speed(grain.rotation) * grain.shape.bounding_radius()
+        };
+        driven.iter().map(of).fold(0.0, f64::max)
+    };
+    (0..times).map(at).collect()
 }
 
 /// Returns the step that the rule allows at `speed` [s].

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::case::estimate::Estimate;
 use crate::case::expect::{Expectation, Measure};
-use crate::case::settling::{is_free, time_step};
+use crate::case::settling::{expected_time_step, is_free};
 use crate::number_format::{AXES, SIDES, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint, outside};
@@ -49,7 +49,8 @@ pub(super) fn warnings(
 
 /// Output intervals that shorten the steps.
 fn output_intervals(setup: &Setup, e: &Estimate) -> Option<String> {
-    let allowed = time_step(setup, e.settling_speed_m_per_s.unwrap_or(0.0));
+    let settling = e.settling_speed_m_per_s.unwrap_or(0.0);
+    let allowed = expected_time_step(setup, settling, e.expected_end_s);
     (e.time_step_s < 0.5 * allowed).then(|| {
         format!(
             "an output every {} makes the steps shorter than the {} they could have: make [output] intervals longer",

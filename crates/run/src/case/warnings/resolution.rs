@@ -1,7 +1,7 @@
 //! Warnings about resolution and cost.
 
 use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
-use crate::case::settling::time_step;
+use crate::case::settling::{prescribed_speeds, time_step};
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::immersed::Scheme;
@@ -84,7 +84,9 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
             viscous: 0.216,
             max_step: f64::INFINITY,
         });
-        let most = time_step(&limits, e.settling_speed_m_per_s.unwrap_or(0.0));
+        let prescribed = prescribed_speeds(setup, e.expected_end_s);
+        let speed = prescribed.into_iter().fold(e.settling_speed_m_per_s.unwrap_or(0.0), f64::max);
+        let most = time_step(&limits, speed);
         if step > most {
             found.push(format!(
                 "the fixed step of {} is above the stability limit of about {}",
