@@ -1150,6 +1150,14 @@ fn a_landing_needs_a_floor() {
 }
 
 #[test]
+fn rest_needs_gravity() {
+    let rest = PAIR.replace("end = \"1 s\"", "end = \"1 s\"\nstop = \"rest\"");
+    good(&rest);
+    let found = problems(&rest.replace("title = \"pair\"", "gravity = [0, 0, 0]"));
+    assert!(found[0].to_string().contains("gravity is zero"), "{}", found[0]);
+}
+
+#[test]
 fn whole_numbers_of_steps_lead_to_each_output() {
     let case = good(PAIR);
     let free = case.estimate(1);
@@ -1161,21 +1169,34 @@ fn whole_numbers_of_steps_lead_to_each_output() {
 
 #[test]
 fn prescribed_motions_count_in_the_expected_step() {
-    let moved = |motion: &str| {
+    let moved_with = |motion: &str, time: &str| {
         let grain = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
         let text = PAIR.replacen(grain, &format!("{grain}\nmotion = {motion}"), 1);
         assert!(text != PAIR);
-        good(&text)
+        good(&text.replace("end = \"1 s\"", time))
     };
-    let step = |motion: &str| moved(motion).estimate(1).time_step_s;
+    let step = |motion: &str| moved_with(motion, "end = \"1 s\"").estimate(1).time_step_s;
     let (free, fast) = (good(PAIR).estimate(1).time_step_s, step("{ velocity = [0, 0, 1] }"));
     // The Courant number of 0.4 at the speed of the fluid beside a sphere.
     assert!((fast / (0.4 * 0.25e-3 / 1.4) - 1.0).abs() < 0.1 && fast < 0.6 * free, "{fast} {free}");
+    // The CFL number is a sum over the axes.
+    let diagonal = step("{ velocity = [0.3, -0.4, 0.3] }");
+    assert!((diagonal / fast - 1.0).abs() < 0.1, "{diagonal}");
     // A sine has 2 / pi of its largest speed on average.
-    let sine = step("{ velocity = { formula = [0, 0, \"sin(200*PI*t)\"] } }");
-    assert!(sine > 1.2 * fast && sine < 1.9 * fast, "{sine} {fast}");
+    for periods in [1, 100, 200, 987, 2584] {
+        let sine = format!("{{ velocity = {{ formula = [0, 0, \"sin({periods}*TAU*t)\"] }} }}");
+        let sine = step(&sine);
+        assert!(sine > 1.2 * fast && sine < 1.9 * fast, "{periods}: {sine} {fast}");
+    }
     let spin = step("{ velocity = \"fixed\", angular_velocity = [0, 0, 1000] }");
     assert!((spin / fast - 1.0).abs() < 0.1, "{spin}");
+    // The largest speed limits a fixed step; at the start it is zero.
+    let limit = |step: &str| {
+        let sine = "{ velocity = { formula = [0, 0, \"sin(10*TAU*t)\"] } }";
+        let fixed = moved_with(sine, &format!("end = \"1 s\"\nstep = \"{step}\""));
+        fixed.estimate(1).warnings.iter().filter(|w| w.contains("above the stability")).count()
+    };
+    assert_eq!((limit("0.2 ms"), limit("0.09 ms")), (1, 0));
 }
 
 #[test]

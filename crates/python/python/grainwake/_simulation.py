@@ -75,7 +75,7 @@ def state(sim: Simulation) -> State:
 def states(sim: Simulation, end: float, every: float, choice: _progress.Choice) -> Iterator[State]:
     """States at the multiples of an interval, and at the end or stop condition of the case."""
     display = _progress.of_run(choice)
-    start, began = sim.time, clock.monotonic()
+    start, wall_s = sim.time, 0.0
     try:
         yield sim.state()
         index = math.floor(sim.time / every * (1 + _SAME)) + 1
@@ -83,9 +83,10 @@ def states(sim: Simulation, end: float, every: float, choice: _progress.Choice) 
             time = min(index * every, end)
             if end - time <= _SHORTEST * sim.time_step:
                 time = end
+            began = clock.monotonic()
             sim._advance(time)
+            wall_s += clock.monotonic() - began
             index = max(index + 1, math.floor(sim.time / every * (1 + _SAME)) + 1)
-            wall_s = clock.monotonic() - began
             progress = {"time": sim.time, "end": end, "start": start, "steps": sim.steps}
             display.update({**progress, "wall_s": wall_s})
             yield sim.state()

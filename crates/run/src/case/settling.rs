@@ -10,8 +10,6 @@ use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::EventParams;
 use grainwake_solver::sim::{Setup, StepRule};
 
-const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
-
 /// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
 /// At a tenth of this ratio some grains become unstable.
 pub(super) const LIGHTEST_FREE: f64 = 0.01;
@@ -172,27 +170,32 @@ pub(super) fn settled_time_step(setup: &Setup) -> f64 {
 /// Returns the mean step expected of a run until `end` [s], at the `settling` speed [m/s] or the
 /// speeds of grains with prescribed motion.
 pub(super) fn expected_time_step(setup: &Setup, settling: f64, end: f64) -> f64 {
-    let speeds = prescribed_speeds(setup, end);
-    let per_second = |speed: &f64| 1.0 / time_step(setup, speed.max(settling));
-    speeds.len() as f64 / speeds.iter().map(per_second).sum::<f64>()
+    let (allowed, speeds) = (step_at(setup), prescribed_speeds(setup, end));
+    let steps_per_second = speeds.iter().map(|speed| 1.0 / allowed(speed.max(settling)));
+    speeds.len() as f64 / steps_per_second.sum::<f64>()
 }
 
-/// Returns the largest speed of the grains with prescribed motion [m/s] at times spread over the
-/// run until `end` [s]; at one time, if no motion is a formula.
+/// Returns the largest speed of the grains with prescribed motion, as the sum over the axes that
+/// counts in the CFL number [m/s], at times spread over the run until `end` [s]; at one time, if no
+/// motion is a formula.
 pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
+    const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
     let times = if setup.prescription.motions.is_empty() { 1 } else { 200 };
     let mut driven: Vec<Grain> = setup.grains.clone();
-    let speed = |constraint: MotionConstraint| match constraint {
-        MotionConstraint::Prescribed(velocity) => velocity.length(),
-        MotionConstraint::Free => 0.0,
+    let prescribed = |constraint: MotionConstraint| match constraint {
+        MotionConstraint::Prescribed(velocity) => velocity,
+        MotionConstraint::Free => DVec3::ZERO,
+    };
+    let of = |grain: &Grain| {
+        let spin = prescribed(grain.rotation).length() * grain.shape.bounding_radius();
+        prescribed(grain.translation).abs().element_sum() + spin
     };
     let at = |n: usize| {
-        // Multiples of the golden ratio keep in step with no period of a motion.
-        let time = (0.5 + n as f64 * GOLDEN_RATIO).fract() * end;
+        // One time in each of equal parts of the run; its place in the part changes from part to
+        // part, so that the times are in phase with no periodic motion.
+        let place = ((n * n) as f64 * GOLDEN_RATIO).fract();
+        let time = (n as f64 + place) / times as f64 * end;
         setup.prescription.prescribe_motion(&mut driven, time);
-        let of = |grain: &Grain| {
-            speed(grain.translation) + speed(grain.rotation) * grain.shape.bounding_radius()
-        };
         driven.iter().map(of).fold(0.0, f64::max)
     };
     (0..times).map(at).collect()
@@ -200,30 +203,35 @@ pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
 
 /// Returns the step that the rule allows at `speed` [s].
 pub(super) fn time_step(setup: &Setup, speed: f64) -> f64 {
+    step_at(setup)(speed)
+}
+
+/// Returns the step [s] that the rule allows, as a function of the speed of the grains [m/s].
+fn step_at(setup: &Setup) -> impl Fn(f64) -> f64 {
     let spacing = setup.finest_spacing();
     let h: Vec<f64> = setup.mesh.resolved_axes().map(|axis| spacing[axis]).collect();
-    match setup.step {
-        StepRule::Fixed(step) => step,
-        StepRule::Limits { cfl, viscous, max_step } => {
-            let Some(fluid) = &setup.fluid else {
-                return max_step;
-            };
-            let lids = setup.boundaries.0.iter().flatten().map(|b| match b {
-                Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
-                    velocity.abs().element_sum()
-                }
-                _ => 0.0,
-            });
-            let given = setup
-                .prescription
-                .initial_speed(&setup.mesh)
-                .unwrap_or(fluid.initial_velocity.abs().element_sum());
+    let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);
+    let inverse_squares: f64 = h.iter().map(|h| h.powi(-2)).sum();
+    // Speed of the fluid without the grains.
+    let given = setup.fluid.as_ref().map_or(0.0, |fluid| {
+        let sides = setup.boundaries.0.iter().flatten().map(|side| match side {
+            Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
+                velocity.abs().element_sum()
+            }
+            _ => 0.0,
+        });
+        let initial = (setup.prescription.initial_speed(&setup.mesh))
+            .unwrap_or(fluid.initial_velocity.abs().element_sum());
+        sides.fold(initial, f64::max)
+    });
+    let (rule, nu) = (setup.step, setup.fluid.map(|fluid| fluid.kinematic_viscosity));
+    move |speed| match (rule, nu) {
+        (StepRule::Fixed(step), _) => step,
+        (StepRule::Limits { max_step, .. }, None) => max_step,
+        (StepRule::Limits { cfl, viscous, max_step }, Some(nu)) => {
             // The fluid beside a settling grain exceeds the speed of the grain.
-            let speed = lids.fold((1.4 * speed).max(given), f64::max);
-            let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);
-            let inverse_squares: f64 = h.iter().map(|h| h.powi(-2)).sum();
-            (cfl * smallest / speed)
-                .min(viscous / (fluid.kinematic_viscosity * inverse_squares))
+            (cfl * smallest / given.max(1.4 * speed))
+                .min(viscous / (nu * inverse_squares))
                 .min(max_step)
         }
     }

@@ -210,8 +210,9 @@ impl Problems<'_> {
             let is_known = |name: &String| {
                 other.values.value.iter().any(|value| value.factors.contains_key(name))
             };
-            let mut factors = axis.values.value.iter().flat_map(|value| &value.factors);
-            if let Some((name, factor)) = factors.find(|(name, _)| is_known(name)) {
+            let factors = axis.values.value.iter().flat_map(|value| &value.factors);
+            let mut seen = BTreeSet::new();
+            for (name, factor) in factors.filter(|(name, _)| is_known(name) && seen.insert(*name)) {
                 let message =
                     format!("the axis \"{}\" has the factor \"{name}\" too", other.name.value);
                 let help = "give the factors of different axes different names";

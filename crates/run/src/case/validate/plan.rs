@@ -159,6 +159,9 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop
     } else if raw.when == StopWhen::Landing && floor(setup).is_none() {
         let message = "the side to which the grains fall or rise is no wall, so none lands on it";
         check.fail(&raw.span, message, "leave out `stop`, or close the side with \"wall\"");
+    } else if raw.when == StopWhen::Rest && setup.gravity == glam::DVec3::ZERO {
+        let message = "a grain is at rest below a fraction of sqrt(g d), and gravity is zero";
+        check.fail(&raw.span, message, "leave out `stop`: the run ends at `end`");
     }
     Stop { when: raw.when, hold: raw.hold.si }
 }

@@ -232,7 +232,7 @@ fn wrong_units(setup: &Setup, plan: &RunPlan, e: &Estimate) -> Vec<String> {
     if steps > ABSURD_STEPS {
         let viscous = matches!(setup.step, StepRule::Limits { .. }) && setup.fluid.is_some();
         let cause = if viscous {
-            "look at the units of viscosity, cell_size and time.end"
+            "look at the units of viscosity, cell_size, velocities and time.end"
         } else {
             "look at the units of time.step and time.end"
         };

@@ -1,7 +1,7 @@
 //! Warnings about resolution and cost.
 
 use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
-use crate::case::settling::{prescribed_speeds, time_step};
+use crate::case::settling::{is_free, prescribed_speeds, time_step};
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::immersed::Scheme;
@@ -127,7 +127,7 @@ fn contact_cost(setup: &Setup, e: &Estimate) -> Option<String> {
     })
 }
 
-/// Initial velocities for which the first fixed step is too long.
+/// Initial velocities of free grains for which the first fixed step is too long.
 fn first_step(setup: &Setup) -> Option<String> {
     let StepRule::Fixed(step) = setup.step else {
         return None;
@@ -144,8 +144,9 @@ fn first_step(setup: &Setup) -> Option<String> {
             .sum::<f64>()
             * step
     };
-    let grains = setup.grains.iter().map(cfl).enumerate();
-    let (index, cfl) = grains.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let free = setup.grains.iter().enumerate().filter(|(_, grain)| is_free(grain));
+    let numbers = free.map(|(index, grain)| (index, cfl(grain)));
+    let (index, cfl) = numbers.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (cfl > UNSTABLE_CFL).then(|| {
         format!(
             "the velocity of grain {index} at the start gives the first step a CFL number of {cfl:.1}: a fixed step of {} or less is stable, and [time] cfl adapts it",
