@@ -329,6 +329,7 @@ values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}
 def test_a_failed_run_of_a_study_is_done(case_file, tmp_path):
     study_file = tmp_path / "study.toml"
     study_file.write_text(f"""
+title = "A step that is too long"
 base = "{case_file}"
 [[axis]]
 name = "step"
