@@ -191,8 +191,8 @@ pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
         prescribed(grain.translation).abs().element_sum() + spin
     };
     let at = |n: usize| {
-        // One time in each of equal parts of the run; its place in the part changes from part to
-        // part, so that the times are in phase with no periodic motion.
+        // One time in each of equal parts of the run, at a place that changes from part to part:
+        // equal intervals would alias a periodic motion.
         let place = ((n * n) as f64 * GOLDEN_RATIO).fract();
         let time = (n as f64 + place) / times as f64 * end;
         setup.prescription.prescribe_motion(&mut driven, time);

@@ -9,7 +9,7 @@ use crate::flow::{Boundaries, Boundary, Flow, FluidParams, NestedFlow};
 use crate::grid::Mesh;
 use crate::math::{Load, Real};
 
-mod stagnation;
+mod manufactured_flow;
 
 const DT: f64 = 0.004;
 

@@ -204,7 +204,7 @@ impl Problems<'_> {
         }
     }
 
-    /// Refuses a factor that an earlier axis has too, whose values would be lost.
+    /// Refuses factors that an earlier axis has too, whose values would be lost.
     fn check_factors_of_others(&mut self, axis: &RawAxis, all: &[RawAxis]) {
         for other in all.iter().take_while(|other| other.name.value != axis.name.value) {
             let is_known = |name: &String| {
