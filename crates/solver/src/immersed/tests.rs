@@ -10,6 +10,8 @@ use crate::grid::Mesh;
 use crate::math::{Load, Real};
 
 mod manufactured_flow;
+mod prescribed;
+mod stagnation_point;
 
 const DT: f64 = 0.004;
 

@@ -19,9 +19,8 @@
 //! the force balances f. Therefore the velocity is prescribed beyond a distance from the surface.
 //! The size of the error depends on that distance, so that the tests check its order only.
 
+use super::prescribed::PrescribedGrain;
 use super::*;
-use crate::dem::MotionConstraint;
-use crate::grid::FACE_OFFSET;
 
 /// Radius R of the sphere.
 const RADIUS: f64 = 0.5;
@@ -138,81 +137,32 @@ fn force_error(delta: f64, cells: usize, path: DVec3) -> f64 {
     let solution = Solution::new(delta);
     let h = 2.0 * RADIUS / cells as f64;
     let mesh = Mesh::cubic([(EDGE / h).round() as usize; 3], h);
-    let params = FluidParams::new(1.0, solution.nu);
     let carried = 2.0 * path / TIME;
-    let sides = Boundaries([[Boundary::Inflow { velocity: carried }; 2]; 3]);
-    let mut flow = Flow::<f64>::new(&mesh, sides, &params);
     // The path begins before the middle of the box, and off the points of the grid.
     let start = 0.5 * EDGE - path + DVec3::new(0.008, 0.018, 0.026);
-    flow.start_from(|axis, x| carried[axis] + solution.velocity(x - start)[axis]);
-    let mut grain =
-        Grain::new(Shape::sphere(RADIUS, 2000), 1.0).with_position(start).with_velocity(carried);
-    grain.translation = MotionConstraint::Prescribed(carried);
-    grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
-    let mut grains = [grain];
-    let mut immersed = ImmersedGrains::new(&flow, Scheme::Aperture, 1.0, solution.nu, &grains);
+    let grain = Grain::new(Shape::sphere(RADIUS, 2000), 1.0).with_position(start);
+    let mut run = PrescribedGrain::new(&mesh, solution.nu, grain, carried);
+    run.flow.start_from(|axis, x| carried[axis] + solution.velocity(x - start)[axis]);
     let fastest = 1.2 * RATE * RADIUS + carried.length();
     let rate = (fastest / (0.2 * h)).max(solution.nu / (0.05 * h * h));
     let steps = 2 * (0.5 * TIME * rate).ceil() as usize;
     let dt = TIME / steps as f64;
-    let (none, mut loads, mut sum) = ([Load::default()], [Load::default()], 0.0);
+    let (part, mut sum) = (1.0 - (-dt / RELAXATION).exp(), 0.0);
     for n in 0..steps {
-        let at = |step: f64| start + (n as f64 + step) * dt * carried;
-        let (kinematics, last_loads) = (grains.each_ref().map(RigidState::of), loads);
-        let velocity = grains[0].rigid_velocity();
-        let previous = [PreviousStep { velocity, ..Default::default() }];
-        flow.predict(dt);
-        drive(&mut flow, &solution, at(0.5), carried, dt);
-        grains[0].pose.position = at(1.0);
-        let input = CouplingInput {
-            grains: &grains,
-            kinematics: &kinematics,
-            previous: &previous,
-            contact: &none,
-            applied: &none,
-            last_loads: &last_loads,
-            crossings: &[],
-            surface_loads: &[],
-            dt,
-        };
-        let coupled = immersed.couple(&mut flow, input);
-        let rigid = RigidityInput {
-            grains: &mut grains,
-            previous: &previous,
-            contact: &none,
-            dt,
-            loads: &mut loads,
-            fluid_impulses: &mut [],
-        };
-        immersed.impose_rigidity(&mut flow, coupled, rigid);
-        flow.project(dt);
-        if n >= steps / 2 {
-            sum += loads[0].force.z;
-        }
-    }
-    let [shear, pressure] = solution.forces();
-    (2.0 * sum / steps as f64 - shear - pressure) / shear
-}
-
-/// Adds the acceleration of the fluid over `dt` to the prediction. Far from the surface the
-/// velocity relaxes to that of the solution.
-fn drive(flow: &mut Flow<f64>, solution: &Solution, centre: DVec3, carried: DVec3, dt: f64) {
-    let mesh = *flow.mesh();
-    let part = 1.0 - (-dt / RELAXATION).exp();
-    let [nx, ny, nz] = mesh.cells;
-    for axis in 0..3 {
-        let predicted = flow.predicted.component_mut(axis);
-        for (k, j, i) in
-            (1..=nz).flat_map(|k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| (k, j, i))))
-        {
-            let x = mesh.position(FACE_OFFSET[axis], [i, j, k]) - centre;
-            let u = &mut predicted[mesh.layout().index(i, j, k)];
+        let centre = start + (n as f64 + 0.5) * dt * carried;
+        run.step(dt, |axis, x, _, u| {
+            let x = x - centre;
             *u += dt * solution.driving(x)[axis];
             if x.length() > RADIUS + NEAR {
                 *u += part * (carried[axis] + solution.velocity(x)[axis] - *u);
             }
+        });
+        if n >= steps / 2 {
+            sum += run.load().force.z;
         }
     }
+    let [shear, pressure] = solution.forces();
+    (2.0 * sum / steps as f64 - shear - pressure) / shear
 }
 
 /// Checks that the order of the error from `coarse` to `fine` cells across is at least `least`, for

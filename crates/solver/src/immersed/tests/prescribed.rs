@@ -1,0 +1,114 @@
+//! A grain with prescribed motion in a flow that a test acts on, coupled step by step.
+
+use super::*;
+use crate::dem::MotionConstraint;
+use crate::grid::{FACE_OFFSET, FaceVector};
+
+/// A grain that is held or carried over the grid without spin, in a fluid of density 1. All sides
+/// of the box move with it.
+pub struct PrescribedGrain {
+    pub flow: Flow<f64>,
+    immersed: ImmersedGrains<f64>,
+    grains: [Grain; 1],
+    loads: [Load; 1],
+    /// Prediction of the last step before the grain forced it [m/s].
+    unforced: FaceVector<f64>,
+    /// Pressure before the last step [m^2/s^2].
+    last_pressure: Vec<f64>,
+    /// Length of the last step [s].
+    dt: f64,
+}
+
+impl PrescribedGrain {
+    /// Puts `grain` and the sides of the box in motion with `carried` [m/s].
+    pub fn new(mesh: &Mesh, nu: f64, grain: Grain, carried: DVec3) -> PrescribedGrain {
+        let sides = Boundaries([[Boundary::Inflow { velocity: carried }; 2]; 3]);
+        let flow = Flow::new(mesh, sides, &FluidParams::new(1.0, nu));
+        let mut grain = grain.with_velocity(carried);
+        grain.translation = MotionConstraint::Prescribed(carried);
+        grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+        let grains = [grain];
+        let immersed = ImmersedGrains::new(&flow, Scheme::Aperture, 1.0, nu, &grains);
+        let last_pressure = vec![0.0; flow.pressure.len()];
+        let (loads, unforced) = ([Load::default()], FaceVector::zeros(mesh));
+        PrescribedGrain { flow, immersed, grains, loads, unforced, last_pressure, dt: 0.0 }
+    }
+
+    /// Makes a step of `dt` [s] in which `act` changes the prediction. Its arguments are the axis
+    /// of a face, the position of the face [m], the velocity that it gains by the pressure of the
+    /// last step [m/s], and its velocity [m/s].
+    pub fn step(&mut self, dt: f64, act: impl Fn(usize, DVec3, f64, &mut f64)) {
+        let (kinematics, last_loads) = (self.grains.each_ref().map(RigidState::of), self.loads);
+        let velocity = self.grains[0].rigid_velocity();
+        let previous = [PreviousStep { velocity, ..Default::default() }];
+        let mesh = *self.flow.mesh();
+        self.flow.predict(dt);
+        self.last_pressure.copy_from_slice(&self.flow.pressure);
+        self.dt = dt;
+        for axis in 0..3 {
+            for cell in cells(&mesh) {
+                let drop = self.pressure_drop(axis, cell);
+                let [i, j, k] = cell;
+                let at = mesh.layout().index(i, j, k);
+                let u = &mut self.flow.predicted.component_mut(axis)[at];
+                act(axis, mesh.position(FACE_OFFSET[axis], cell), drop, u);
+            }
+        }
+        self.grains[0].pose.position += dt * self.grains[0].velocity;
+        // A contact load that vanishes later keeps the grain from being updated at once.
+        let (contact, none) = ([impact()], [Load::default()]);
+        let input = CouplingInput {
+            grains: &self.grains,
+            kinematics: &kinematics,
+            previous: &previous,
+            contact: &contact,
+            applied: &none,
+            last_loads: &last_loads,
+            crossings: &[],
+            surface_loads: &[],
+            dt,
+        };
+        let coupled = self.immersed.couple(&mut self.flow, input);
+        self.unforced.copy_from(&self.flow.predicted);
+        let rigid = RigidityInput {
+            grains: &mut self.grains,
+            previous: &previous,
+            contact: &none,
+            dt,
+            loads: &mut self.loads,
+            fluid_impulses: &mut [],
+        };
+        self.immersed.impose_rigidity(&mut self.flow, coupled, rigid);
+        self.flow.project(dt);
+    }
+
+    /// Load on the grain by the fluid in the last step.
+    pub fn load(&self) -> Load {
+        self.loads[0]
+    }
+
+    /// Velocity that a face gained by the pressure before the last step [m/s].
+    pub fn pressure_drop(&self, axis: usize, [i, j, k]: [usize; 3]) -> f64 {
+        let mesh = self.flow.mesh();
+        let above = mesh.layout().index(i, j, k);
+        let below = above - mesh.layout().strides()[axis];
+        self.dt / mesh.spacing[axis] * (self.last_pressure[below] - self.last_pressure[above])
+    }
+
+    /// Half-width of the band around the surface [m].
+    pub fn half_width(&self) -> f64 {
+        self.immersed.locator.eps
+    }
+
+    /// Velocity that a face gained by the grain in the last step [m/s].
+    pub fn gain(&self, axis: usize, [i, j, k]: [usize; 3]) -> f64 {
+        let at = self.flow.mesh().layout().index(i, j, k);
+        self.flow.predicted.component(axis)[at] - self.unforced.component(axis)[at]
+    }
+}
+
+/// Indices [i, j, k] of all cells.
+pub fn cells(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> + use<> {
+    let [nx, ny, nz] = mesh.cells;
+    (1..=nz).flat_map(move |k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| [i, j, k])))
+}
