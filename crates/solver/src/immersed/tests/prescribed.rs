@@ -4,8 +4,8 @@ use super::*;
 use crate::dem::MotionConstraint;
 use crate::grid::{FACE_OFFSET, FaceVector};
 
-/// A grain that is held or carried over the grid without spin, in a fluid of density 1. All sides
-/// of the box move with it.
+/// A grain that is held or carried over the grid without spin, in a fluid of density 1. At all
+/// sides the fluid has its velocity.
 pub struct PrescribedGrain {
     pub flow: Flow<f64>,
     immersed: ImmersedGrains<f64>,
@@ -13,7 +13,7 @@ pub struct PrescribedGrain {
     loads: [Load; 1],
     /// Prediction of the last step before the grain forced it [m/s].
     unforced: FaceVector<f64>,
-    /// Pressure before the last step [m^2/s^2].
+    /// Pressure at the start of the last step [m^2/s^2].
     last_pressure: Vec<f64>,
     /// Length of the last step [s].
     dt: f64,
@@ -35,8 +35,8 @@ impl PrescribedGrain {
     }
 
     /// Makes a step of `dt` [s] in which `act` changes the prediction. Its arguments are the axis
-    /// of a face, the position of the face [m], the velocity that it gains by the pressure of the
-    /// last step [m/s], and its velocity [m/s].
+    /// of a face, the position of the face [m], the velocity that it gains by the pressure at
+    /// the start of the step [m/s], and its velocity [m/s].
     pub fn step(&mut self, dt: f64, act: impl Fn(usize, DVec3, f64, &mut f64)) {
         let (kinematics, last_loads) = (self.grains.each_ref().map(RigidState::of), self.loads);
         let velocity = self.grains[0].rigid_velocity();
@@ -47,15 +47,16 @@ impl PrescribedGrain {
         self.dt = dt;
         for axis in 0..3 {
             for cell in cells(&mesh) {
-                let drop = self.pressure_drop(axis, cell);
+                let pressure_gain = self.pressure_gain(axis, cell);
                 let [i, j, k] = cell;
                 let at = mesh.layout().index(i, j, k);
                 let u = &mut self.flow.predicted.component_mut(axis)[at];
-                act(axis, mesh.position(FACE_OFFSET[axis], cell), drop, u);
+                act(axis, mesh.position(FACE_OFFSET[axis], cell), pressure_gain, u);
             }
         }
         self.grains[0].pose.position += dt * self.grains[0].velocity;
-        // A contact load that vanishes later keeps the grain from being updated at once.
+        // A contact load that vanishes later keeps the grain from being updated at once, so that
+        // the prediction can be read before it is forced.
         let (contact, none) = ([impact()], [Load::default()]);
         let input = CouplingInput {
             grains: &self.grains,
@@ -87,8 +88,8 @@ impl PrescribedGrain {
         self.loads[0]
     }
 
-    /// Velocity that a face gained by the pressure before the last step [m/s].
-    pub fn pressure_drop(&self, axis: usize, [i, j, k]: [usize; 3]) -> f64 {
+    /// Velocity that a face gained by the pressure at the start of the last step [m/s].
+    pub fn pressure_gain(&self, axis: usize, [i, j, k]: [usize; 3]) -> f64 {
         let mesh = self.flow.mesh();
         let above = mesh.layout().index(i, j, k);
         let below = above - mesh.layout().strides()[axis];

@@ -35,12 +35,13 @@ const CUT: f64 = 4.0;
 const HEIGHT: f64 = 6.0;
 /// Distance from the axis within which the errors are measured.
 const WINDOW: f64 = 5.0;
-/// Time of a run, and time from which the errors are measured. They are steady from 2 on.
+/// Time of a run, and time from which the errors are averaged. Those of held planes are steady
+/// then.
 const TIME: f64 = 6.0;
 const STEADY: f64 = 3.0;
 
-/// phi''(0).
-const WALL_CURVATURE: f64 = 1.311_937_693_88;
+/// phi''(0): wall shear over density nu a s / delta.
+const WALL_SHEAR: f64 = 1.311_937_693_88;
 /// Value of z / delta from which phi is linear.
 const PROFILE_END: f64 = 5.0;
 /// Steps of the solution phi up to there.
@@ -61,7 +62,7 @@ impl Layer {
         let h = PROFILE_END / PROFILE_STEPS as f64;
         let rate = |[p, q, r]: [f64; 3]| [q, r, q * q - 1.0 - 2.0 * p * r];
         let moved = |y: [f64; 3], by: f64, k: [f64; 3]| [0, 1, 2].map(|n| y[n] + by * k[n]);
-        let (mut y, mut profile) = ([0.0, 0.0, WALL_CURVATURE], Vec::new());
+        let (mut y, mut profile) = ([0.0, 0.0, WALL_SHEAR], Vec::new());
         for _ in 0..=PROFILE_STEPS {
             profile.push([y[0], y[1]]);
             let k_1 = rate(y);
@@ -132,9 +133,8 @@ impl Layer {
         -2.0 * self.kinematic_viscosity() * slope - 0.5 * (flat.length_squared() + w * w)
     }
 
-    /// Velocity on the face at `x` that the exact pressure, ended like the flow, gives in unit
-    /// time.
-    fn pressure_drop(&self, axis: usize, x: DVec3) -> f64 {
+    /// Acceleration of the face at `x` by the exact pressure, which ends like the flow.
+    fn pressure_acceleration(&self, axis: usize, x: DVec3) -> f64 {
         let half = 0.5 * DVec3::AXES[axis];
         let [above, below] = [x + half, x - half].map(|x| Layer::cutoff(x) * self.pressure(x));
         below - above
@@ -142,7 +142,7 @@ impl Layer {
 }
 
 /// A layer of thickness `delta` on a plane that is carried by `path` in a run. The stagnation point
-/// is at `offset` from the middle of the box at half time.
+/// is at `offset` from the centre of the cell below the middle of the box at half time.
 struct Case {
     delta: f64,
     normal: DVec3,
@@ -151,8 +151,8 @@ struct Case {
 }
 
 impl Case {
-    /// Relative errors of the wall shear and of the pressure along the wall; part of the shear that
-    /// the pressure on closed faces outside the plane gives.
+    /// Relative errors of the wall shear and of the variation of the pressure; force of the
+    /// pressure on closed faces outside the plane over the exact shear.
     fn errors(&self) -> [f64; 3] {
         let layer = Layer::new(self.delta, self.normal);
         let (normal, nu) = (layer.normal, layer.kinematic_viscosity());
@@ -170,23 +170,23 @@ impl Case {
         let mut run = PrescribedGrain::new(&mesh, nu, grain, carried);
         run.flow.start_from(|axis, x| carried[axis] + layer.velocity(axis, x - start));
         let fastest = 2.0 * EXACT + carried.length();
-        let steps = (TIME * (fastest / 0.2).max(nu / 0.05)).ceil() as usize;
+        let steps = (TIME * fastest / 0.2).ceil() as usize;
         let dt = TIME / steps as f64;
         let (mut sums, mut count) = ([0.0; 3], 0.0);
         for n in 1..=steps {
             let centre = start + n as f64 * dt * carried;
-            run.step(dt, |axis, x, drop, u| {
+            run.step(dt, |axis, x, pressure_gain, u| {
                 let x = x - centre;
                 let part = ((x.length() - NEAR) / GROWTH).clamp(0.0, 1.0).powi(2);
                 if part > 0.0 {
                     // The pressure tends to the exact one where the velocity is prescribed.
-                    let missing = drop - dt * layer.pressure_drop(axis, x);
+                    let missing = pressure_gain - dt * layer.pressure_acceleration(axis, x);
                     *u += part * (carried[axis] + layer.velocity(axis, x) + missing - *u);
                 }
             });
             if n as f64 * dt > STEADY && n % 5 == 0 {
-                let [moment, closed] = shear(&run, &layer, centre, dt);
-                let errors = [moment - 1.0, pressure(&run, &layer, centre), closed];
+                let [integral, closed] = shear(&run, &layer, centre, dt);
+                let errors = [integral - 1.0, pressure(&run, &layer, centre), closed];
                 sums = [0, 1, 2].map(|of| sums[of] + errors[of]);
                 count += 1.0;
             }
@@ -195,37 +195,36 @@ impl Case {
     }
 }
 
-/// Moment of the wall shear of the last step around `centre`, the integral of
-/// (1 - (s / WINDOW)^2)^3 times s times the shear away from the axis; and the part of it that the
-/// pressure exerts on the fluid next to the plane whose faces are closed. Both over the exact
-/// moment.
+/// Integral over the plane of (1 - (s / WINDOW)^2)^3 times s times the shear away from the axis in
+/// the last step, around `centre`; and the part of it by the pressure on closed faces outside the
+/// plane. Both over the exact integral.
 fn shear(run: &PrescribedGrain, layer: &Layer, centre: DVec3, dt: f64) -> [f64; 2] {
     let (mesh, normal) = (run.flow.mesh(), layer.normal.to_array());
     let width = layer.normal.abs().element_sum();
-    let (mut moment, mut closed) = (0.0, 0.0);
+    let (mut integral, mut closed) = (0.0, 0.0);
     for axis in 0..3 {
         for cell in cells(mesh) {
             let (z, flat) = layer.coordinates(mesh.position(FACE_OFFSET[axis], cell) - centre);
             let weight = 1.0 - (flat.length() / WINDOW).powi(2);
             if weight > 0.0 && z > -0.5 * HEIGHT {
-                let lever_arm = weight.powi(3) * flat[axis] / dt;
-                let [gain, drop] = [run.gain(axis, cell), run.pressure_drop(axis, cell)];
+                let weight_s = weight.powi(3) * flat[axis] / dt;
+                let [gain, pressure_gain] = [run.gain(axis, cell), run.pressure_gain(axis, cell)];
                 // The plane takes what the fluid loses, but for the pressure on the ends of the
                 // solid part of the face.
-                let solid_fraction = (0.5 - z / width).clamp(0.0, 1.0);
-                moment -= lever_arm * (gain + solid_fraction * drop);
+                let cut_fraction = (0.5 - z / width).clamp(0.0, 1.0);
+                integral -= weight_s * (gain + cut_fraction * pressure_gain);
                 let open =
                     pressure_weight(Scalar(z), normal.map(Scalar), [1.0; 3], run.half_width());
-                closed += lever_arm * (1.0 - open.0 - solid_fraction) * drop;
+                closed += weight_s * (1.0 - open.0 - cut_fraction) * pressure_gain;
             }
         }
     }
-    let exact = layer.delta * WALL_CURVATURE * PI * WINDOW.powi(4) / 20.0;
-    [moment / exact, closed / exact]
+    let exact = layer.delta * WALL_SHEAR * PI * WINDOW.powi(4) / 20.0;
+    [integral / exact, closed / exact]
 }
 
-/// Error of the rise of the pressure along the wall, fitted to the cells from 0.5 to 1.5 spacings
-/// above it.
+/// Error of the variation of the pressure, fitted to the cells from 0.5 to 1.5 spacings above the
+/// plane.
 fn pressure(run: &PrescribedGrain, layer: &Layer, centre: DVec3) -> f64 {
     let mesh = run.flow.mesh();
     let mut pairs = Vec::new();
@@ -270,20 +269,50 @@ fn the_profile_has_the_displacement_thickness_of_homann_flow() {
 }
 
 #[test]
+fn velocity_and_pressure_solve_the_equation_of_momentum() {
+    let layer = Layer::new(0.8, TILTED);
+    // The velocity is a difference of the potential over a spacing; this is the limit.
+    let velocity = |x: DVec3| {
+        let (step, potential) = (1e-2, |x: DVec3| layer.potential(x));
+        let [dx, dy, dz] = DVec3::AXES
+            .map(|axis| (potential(x + step * axis) - potential(x - step * axis)) / (2.0 * step));
+        DVec3::new(dy.z - dz.y, dz.x - dx.z, dx.y - dy.x)
+    };
+    let (step, nu) = (0.05, layer.kinematic_viscosity());
+    for (z, along) in [(0.4, DVec3::X), (0.9, DVec3::Y), (2.0, DVec3::Z)] {
+        let x = z * layer.normal + 2.0 * layer.normal.cross(along);
+        let (u, mut residual) = (velocity(x), DVec3::ZERO);
+        for axis in 0..3 {
+            let [below, above] = [-step, step].map(|s| x + s * DVec3::AXES[axis]);
+            let [under, over] = [below, above].map(velocity);
+            residual += u[axis] * (over - under) / (2.0 * step);
+            residual -= nu * (over + under - 2.0 * u) / (step * step);
+            residual[axis] += (layer.pressure(above) - layer.pressure(below)) / (2.0 * step);
+        }
+        assert!(residual.length() < 2e-2 * x.length(), "{x}: {residual}");
+    }
+}
+
+#[test]
 #[cfg_attr(debug_assertions, ignore = "slow without optimisation")]
 fn the_wall_shear_converges_held_and_carried() {
-    let errors = [0.5, 1.0].map(|delta| {
-        let carried = cases(delta).pop().unwrap();
-        let held = Case { path: DVec3::ZERO, ..cases(delta).pop().unwrap() };
-        [held, carried].map(|case| case.errors())
-    });
-    for n in [0, 1] {
-        let [[thin, thin_pressure, _], [thick, thick_pressure, _]] = errors.map(|error| error[n]);
-        assert!((0.0..0.12).contains(&thin) && thick.abs() < 0.03, "{errors:?}");
-        assert!(thin_pressure.abs() < 0.08 && thick_pressure.abs() < 0.08, "{errors:?}");
+    for path in [DVec3::ZERO, 4.0 * DVec3::X] {
+        let [thin, thick] = [0.5, 1.0].map(|delta| {
+            let offset = DVec3::new(0.13, 0.21, 0.0);
+            let errors = Case { delta, normal: TILTED, offset, path }.errors();
+            println!("delta {delta}, path {path}: {errors:.3?}");
+            let [_, pressure, closed] = errors;
+            assert!(pressure.abs() < 0.08, "{errors:?}");
+            // The closed faces outside a plane are worth 0.29 spacings of fluid.
+            let expected = 0.29 / (WALL_SHEAR * delta);
+            assert!((closed / expected - 1.0).abs() < 0.1, "{errors:?}");
+            errors[0]
+        });
+        assert!(thin.abs() < 0.1 && thick.abs() < 0.5 * thin.abs() + 0.01, "{thin} {thick}");
     }
-    let [held, carried] = errors[0];
-    assert!((held[0] - carried[0]).abs() < 0.02, "{errors:?}");
+    let offset = DVec3::new(0.13, 0.21, 0.25);
+    let [aligned, ..] = Case { delta: 0.5, normal: DVec3::Z, offset, path: DVec3::ZERO }.errors();
+    assert!(aligned.abs() < 0.18, "{aligned}");
 }
 
 #[test]
