@@ -135,6 +135,9 @@ impl Layer {
 
     /// Acceleration of the face at `x` by the exact pressure, which ends like the flow.
     fn pressure_acceleration(&self, axis: usize, x: DVec3) -> f64 {
+        if x.length() > EXACT + CUT + 1.0 {
+            return 0.0;
+        }
         let half = 0.5 * DVec3::AXES[axis];
         let [above, below] = [x + half, x - half].map(|x| Layer::cutoff(x) * self.pressure(x));
         below - above
@@ -295,23 +298,22 @@ fn velocity_and_pressure_solve_the_equation_of_momentum() {
 
 #[test]
 #[cfg_attr(debug_assertions, ignore = "slow without optimisation")]
-fn the_wall_shear_converges_held_and_carried() {
-    for path in [DVec3::ZERO, 4.0 * DVec3::X] {
-        let [thin, thick] = [0.5, 1.0].map(|delta| {
-            let offset = DVec3::new(0.13, 0.21, 0.0);
-            let errors = Case { delta, normal: TILTED, offset, path }.errors();
-            println!("delta {delta}, path {path}: {errors:.3?}");
-            let [_, pressure, closed] = errors;
-            assert!(pressure.abs() < 0.08, "{errors:?}");
-            // The closed faces outside a plane are worth 0.29 spacings of fluid.
-            let expected = 0.29 / (WALL_SHEAR * delta);
-            assert!((closed / expected - 1.0).abs() < 0.1, "{errors:?}");
-            errors[0]
-        });
-        assert!(thin.abs() < 0.1 && thick.abs() < 0.5 * thin.abs() + 0.01, "{thin} {thick}");
-    }
-    let offset = DVec3::new(0.13, 0.21, 0.25);
-    let [aligned, ..] = Case { delta: 0.5, normal: DVec3::Z, offset, path: DVec3::ZERO }.errors();
+fn the_wall_shear_converges_and_is_that_of_a_carried_plane() {
+    let shear = |delta: f64, normal, height, path| {
+        let errors = Case { delta, normal, offset: DVec3::new(0.13, 0.21, height), path }.errors();
+        println!("delta {delta}, normal {normal}, path {path}: {errors:.3?}");
+        let [shear, pressure, closed] = errors;
+        assert!(pressure.abs() < 0.08, "{errors:?}");
+        // The closed faces outside a plane are worth 0.29 spacings of fluid.
+        let expected = 0.29 / (WALL_SHEAR * delta);
+        assert!((closed / expected - 1.0).abs() < 0.1, "{errors:?}");
+        shear
+    };
+    let [thin, thick] = [0.5, 1.0].map(|delta| shear(delta, TILTED, 0.0, DVec3::ZERO));
+    assert!(thin.abs() < 0.1 && thick.abs() < 0.5 * thin.abs() + 0.01, "{thin} {thick}");
+    let carried = shear(0.5, TILTED, 0.0, 4.0 * DVec3::X);
+    assert!((carried - thin).abs() < 0.02, "{carried} {thin}");
+    let aligned = shear(0.5, DVec3::Z, 0.25, DVec3::ZERO);
     assert!(aligned.abs() < 0.18, "{aligned}");
 }
 
