@@ -33,11 +33,6 @@ fn random_flow(mesh: &Mesh, boundaries: Boundaries, nu: f64) -> Flow {
     flow
 }
 
-fn interior(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> + use<> {
-    let [nx, ny, nz] = mesh.cells;
-    (1..=nz).flat_map(move |k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| [i, j, k])))
-}
-
 /// Advection and diffusion of the present velocity, per component.
 fn tendencies(flow: &mut Flow) -> FaceVector {
     flow.predict(1.0);
@@ -63,7 +58,7 @@ fn divergence_is_minus_the_transposed_gradient() {
     flow.boundaries.set_normal(&mut u);
     let h = mesh.spacing;
     let (mut left, mut right, mut size) = (0.0, 0.0, 0.0);
-    for [i, j, k] in interior(&mesh) {
+    for [i, j, k] in mesh.indices() {
         let div = (u.x.at(i + 1, j, k) - u.x.at(i, j, k)) / h.x
             + (u.y.at(i, j + 1, k) - u.y.at(i, j, k)) / h.y
             + (u.z.at(i, j, k + 1) - u.z.at(i, j, k)) / h.z;
@@ -88,7 +83,8 @@ fn projection_leaves_round_off_divergence() {
             let m = flow.project(0.01);
             assert!(m.max_divergence <= 1e-10 * m.max_rate, "{m:?}");
             let h = mesh.spacing;
-            let worst = interior(&mesh)
+            let worst = mesh
+                .indices()
                 .map(|[i, j, k]| {
                     let u = &flow.velocity;
                     ((u.x.at(i + 1, j, k) - u.x.at(i, j, k)) / h.x
@@ -113,7 +109,7 @@ fn the_mean_pressure_is_zero() {
             flow.predict(0.01);
             flow.project(0.01);
         }
-        let inside = interior(&mesh).map(|[i, j, k]| flow.pressure.at(i, j, k));
+        let inside = mesh.indices().map(|[i, j, k]| flow.pressure.at(i, j, k));
         let (sum, size) = inside.fold((0.0, 0.0), |(sum, size), p| (sum + p, size + p.abs()));
         assert!(sum.abs() < 1e-11 * size, "{sum:e} of {size:e}");
     }
@@ -126,7 +122,7 @@ fn advection_conserves_momentum_and_kinetic_energy() {
     let h = tendencies(&mut flow);
     for axis in 0..3 {
         let (mut momentum, mut size) = (0.0, 0.0);
-        for [i, j, k] in interior(&mesh) {
+        for [i, j, k] in mesh.indices() {
             let value = h.component(axis)[mesh.layout().index(i, j, k)];
             momentum += value;
             size += value.abs();
@@ -134,7 +130,7 @@ fn advection_conserves_momentum_and_kinetic_energy() {
         assert!(momentum.abs() <= 1e-13 * size, "momentum {axis}: {momentum:e} of {size:e}");
     }
     let (mut power, mut size) = (0.0, 0.0);
-    for [i, j, k] in interior(&mesh) {
+    for [i, j, k] in mesh.indices() {
         let at = mesh.layout().index(i, j, k);
         for axis in 0..3 {
             let p = h.component(axis)[at] * flow.velocity.component(axis)[at];
@@ -173,7 +169,7 @@ fn taylor_green(n: usize, dt: f64, steps: usize, nu: f64, plane: [usize; 2]) -> 
     }
     let t = dt * steps as f64;
     let mut worst: f64 = 0.0;
-    for [i, j, k] in interior(&mesh) {
+    for [i, j, k] in mesh.indices() {
         for axis in 0..3 {
             let x = mesh.position(crate::grid::FACE_OFFSET[axis], [i, j, k]);
             let u = flow.velocity.component(axis)[mesh.layout().index(i, j, k)];
@@ -237,7 +233,7 @@ fn beltrami(n: usize) -> f64 {
         flow.project(dt);
     }
     let decay = (-nu * dt * steps as f64).exp();
-    interior(&mesh)
+    mesh.indices()
         .map(|[i, j, k]| {
             let x = mesh.position(crate::grid::FACE_OFFSET[0], [i, j, k]);
             (flow.velocity.x.at(i, j, k) - decay * (x.z.sin() + 0.7 * x.y.cos())).abs()
@@ -354,7 +350,7 @@ fn outflow_keeps_the_mass_of_the_box() {
         assert!(m.max_divergence <= 1e-10 * m.max_rate, "{m:?}");
     }
     let through = |i: usize| {
-        interior(&mesh)
+        mesh.indices()
             .filter(|[x, ..]| *x == 1)
             .map(|[_, j, k]| flow.velocity.x.at(i, j, k))
             .sum::<f64>()

@@ -91,6 +91,12 @@ impl Mesh {
         let distance = move |i: i64| origin + (i as f64 + 0.5) * h - centre;
         cells.map(move |i| (i.rem_euclid(n) as usize, distance(i)))
     }
+    /// Indices [i, j, k] of all cells, from 1 on.
+    #[cfg(test)]
+    pub(crate) fn indices(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
+        let [nx, ny, nz] = self.cells;
+        (1..=nz).flat_map(move |k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| [i, j, k])))
+    }
     /// Memory layout of the fields of the whole box.
     pub(crate) fn layout(&self) -> Layout {
         Layout { cells: self.cells }

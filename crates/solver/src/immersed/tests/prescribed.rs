@@ -4,8 +4,8 @@ use super::*;
 use crate::dem::MotionConstraint;
 use crate::grid::{FACE_OFFSET, FaceVector};
 
-/// A grain that is held or carried over the grid without spin, in a fluid of density 1. At all
-/// sides the fluid has its velocity.
+/// A grain that is held or carried over the grid without spin, in a fluid of density 1. At the
+/// sides of the box the fluid moves with the grain.
 pub struct PrescribedGrain {
     pub flow: Flow<f64>,
     immersed: ImmersedGrains<f64>,
@@ -20,7 +20,7 @@ pub struct PrescribedGrain {
 }
 
 impl PrescribedGrain {
-    /// Puts `grain` and the sides of the box in motion with `carried` [m/s].
+    /// Moves `grain`, and the fluid at the sides of the box, with the velocity `carried` [m/s].
     pub fn new(mesh: &Mesh, nu: f64, grain: Grain, carried: DVec3) -> PrescribedGrain {
         let sides = Boundaries([[Boundary::Inflow { velocity: carried }; 2]; 3]);
         let flow = Flow::new(mesh, sides, &FluidParams::new(1.0, nu));
@@ -46,7 +46,7 @@ impl PrescribedGrain {
         self.last_pressure.copy_from_slice(&self.flow.pressure);
         self.dt = dt;
         for axis in 0..3 {
-            for cell in cells(&mesh) {
+            for cell in mesh.indices() {
                 let pressure_gain = self.pressure_gain(axis, cell);
                 let [i, j, k] = cell;
                 let at = mesh.layout().index(i, j, k);
@@ -106,10 +106,4 @@ impl PrescribedGrain {
         let at = self.flow.mesh().layout().index(i, j, k);
         self.flow.predicted.component(axis)[at] - self.unforced.component(axis)[at]
     }
-}
-
-/// Indices [i, j, k] of all cells.
-pub fn cells(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> + use<> {
-    let [nx, ny, nz] = mesh.cells;
-    (1..=nz).flat_map(move |k| (1..=ny).flat_map(move |j| (1..=nx).map(move |i| [i, j, k])))
 }

@@ -11,11 +11,11 @@
 //!
 //! The velocity is the curl of -a delta phi C (e_z x r). The factor C of the distance r from the
 //! stagnation point is 1 up to `EXACT` and 0 from `EXACT` + `CUT` on, so that the flow ends before
-//! the sides of the box. The velocity is prescribed beyond `NEAR`.
+//! the sides of the box. Beyond `NEAR` the velocity is prescribed, at first in part.
 //!
 //! The unit of length is the spacing of the grid, that of time 1 / a. The density is 1.
 
-use super::prescribed::{PrescribedGrain, cells};
+use super::prescribed::PrescribedGrain;
 use super::*;
 use crate::grid::FACE_OFFSET;
 use crate::immersed::forcing::pressure_weight;
@@ -206,7 +206,7 @@ fn shear(run: &PrescribedGrain, layer: &Layer, centre: DVec3, dt: f64) -> [f64; 
     let width = layer.normal.abs().element_sum();
     let (mut integral, mut closed) = (0.0, 0.0);
     for axis in 0..3 {
-        for cell in cells(mesh) {
+        for cell in mesh.indices() {
             let (z, flat) = layer.coordinates(mesh.position(FACE_OFFSET[axis], cell) - centre);
             let weight = 1.0 - (flat.length() / WINDOW).powi(2);
             if weight > 0.0 && z > -0.5 * HEIGHT {
@@ -231,7 +231,7 @@ fn shear(run: &PrescribedGrain, layer: &Layer, centre: DVec3, dt: f64) -> [f64; 
 fn pressure(run: &PrescribedGrain, layer: &Layer, centre: DVec3) -> f64 {
     let mesh = run.flow.mesh();
     let mut pairs = Vec::new();
-    for [i, j, k] in cells(mesh) {
+    for [i, j, k] in mesh.indices() {
         let x = mesh.position([0.5; 3], [i, j, k]) - centre;
         let (z, flat) = layer.coordinates(x);
         if flat.length() < WINDOW && (0.5..1.5).contains(&z) {
@@ -320,16 +320,16 @@ fn the_wall_shear_converges_and_is_that_of_a_carried_plane() {
 #[test]
 #[ignore = "several minutes"]
 fn table_of_the_wall_shear_and_the_pressure() {
-    for (delta, largest) in [(0.25, 0.7), (0.5, 0.2), (1.0, 0.06), (2.0, 0.02)] {
+    for (delta, largest) in [(0.25, 0.56), (0.5, 0.18), (1.0, 0.054), (2.0, 0.014)] {
         for case in cases(delta) {
             let [shear, pressure, closed] = case.errors().map(|error| 100.0 * error);
             let Case { normal, offset, path, .. } = case;
             println!(
                 "delta {delta}, normal {normal}, offset {:.2}, path {path}: shear {shear:+.1} %, \
-                 pressure {pressure:+.1} %, shear by closed faces {closed:.1} %",
+                 pressure {pressure:+.1} %, closed faces {closed:.1} %",
                 offset.z
             );
-            assert!(shear.abs() < 100.0 * largest && pressure.abs() < 20.0);
+            assert!(shear.abs() < 100.0 * largest && pressure.abs() < 8.0);
         }
     }
 }
