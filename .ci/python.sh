@@ -2,6 +2,7 @@
 # Builds the wheel of the Python package, tests it in clean environments, checks its types and runs
 # the notebooks. Wheel and executed notebooks are kept for .ci/site.sh. Bounds: wheel at most 15 MB,
 # import below 0.3 s of processor time, each notebook below 60 s.
+# The program is $GRAINWAKE, or built if that is empty.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root="$PWD"
@@ -40,8 +41,12 @@ python3 .ci/first_example.py docs/python.md > "$work/first.py"
 python3 -m venv "$work/full"
 "$work/full/bin/pip" install -q "$wheel[all]" pytest mypy pandas-stubs \
   nbclient ipykernel matplotlib trimesh
-cargo build --release --quiet
-(cd "$work" && GRAINWAKE_CLI="$root/target/release/grainwake" \
+program="${GRAINWAKE:-}"
+if [ -z "$program" ]; then
+  cargo build --release --quiet
+  program="${CARGO_TARGET_DIR:-$root/target}/release/grainwake"
+fi
+(cd "$work" && GRAINWAKE_CLI="$program" \
   "$work/full/bin/python" -m pytest -q -p no:cacheprovider "$root/crates/python/tests")
 (cd "$work" && "$work/full/bin/python" -m mypy --config-file "$root/crates/python/pyproject.toml" \
   -p grainwake)

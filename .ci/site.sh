@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the documentation site into target/site; a dead link or a warning is an error.
-# Needs the output of .ci/python.sh (wheel, executed notebooks) in target/site-input.
+# Needs the output of .ci/python.sh (wheel, executed notebooks) in target/site-input. The program
+# is $GRAINWAKE, or built if that is empty.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 started=$SECONDS
@@ -24,8 +25,12 @@ fi
 (cd .ci/site && npm ci --no-audit --no-fund --ignore-scripts --silent)
 
 # 2. Generated pages.
-cargo build --release --quiet -p grainwake
-"$env/bin/python" .ci/site/commands.py "$target/release/grainwake" > "$SITE_INPUT/commands.md"
+program="${GRAINWAKE:-}"
+if [ -z "$program" ]; then
+  cargo build --release --quiet
+  program="$target/release/grainwake"
+fi
+"$env/bin/python" .ci/site/commands.py "$program" > "$SITE_INPUT/commands.md"
 "$env/bin/python" .ci/site/api.py "$SITE_INPUT/api"
 "$env/bin/python" .ci/site/gallery.py --check
 RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps --quiet

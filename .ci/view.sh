@@ -2,6 +2,7 @@
 # Checks the interactive page: the committed bundle is what its sources give, and the browser tests
 # pass. Installs npm packages and Chromium if they are missing.
 # Usage: .ci/view.sh [RUN]; RUN is a finished run folder of cases/dkt-pair/quick.toml.
+# The program is $GRAINWAKE, or built if that is empty.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,8 +16,10 @@ fi
 web=crates/view/web
 (cd "$web" && npm ci --no-audit --no-fund --ignore-scripts --silent && node build.mjs --check)
 
-cargo build --release --quiet -p grainwake
-export GRAINWAKE="${CARGO_TARGET_DIR:-$PWD/target}/release/grainwake"
+if [ -z "${GRAINWAKE:-}" ]; then
+  cargo build --release --quiet
+  export GRAINWAKE="${CARGO_TARGET_DIR:-$PWD/target}/release/grainwake"
+fi
 if [ $# -gt 0 ]; then
   RUN="$(realpath "$1")"
 else

@@ -10,7 +10,7 @@ mod initial;
 mod loops;
 mod view;
 
-pub(crate) use borrowed::{BorrowedRow, borrowed_rows};
+pub(crate) use borrowed::{BorrowedRow, ROWS_RECORDED, borrowed_rows};
 pub(crate) use field::{Centre, FACE_OFFSET, FaceVector, Field};
 #[cfg(test)]
 pub(crate) use field::{FaceZ, Location};

@@ -1,11 +1,11 @@
-//! Log of the faces that the grains use while they are coupled, in debug builds.
+//! Log of the faces that the grains use while they are coupled.
 
 use std::sync::Mutex;
 
 use crate::grid::BorrowedRow;
 
 /// Rows of the prediction that each grain has borrowed, to assert that no grain writes a face that
-/// another one uses at once; empty in release builds.
+/// another one uses at once; empty unless rows are recorded.
 #[derive(Default)]
 pub struct AccessLog(Mutex<Vec<(usize, BorrowedRow)>>);
 

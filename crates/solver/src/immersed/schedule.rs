@@ -25,7 +25,7 @@ use super::update::{
 use super::{ImmersedGrains, Scheme};
 use crate::dem::{Grain, GrainResponse};
 use crate::flow::Flow;
-use crate::grid::borrowed_rows;
+use crate::grid::{ROWS_RECORDED, borrowed_rows};
 use crate::math::{Load, Real};
 
 /// Grains located and coupled to the prediction: made by [`ImmersedGrains::couple`], consumed by
@@ -93,8 +93,8 @@ impl<R: Real> ImmersedGrains<R> {
         self.couple_marked(flow, input, updates)
     }
 
-    /// Couples grains whose isolated ones are marked in `updates`. Panics in debug builds if a face
-    /// that one grain writes is used by another while both are coupled.
+    /// Couples grains whose isolated ones are marked in `updates`. With [`ROWS_RECORDED`], panics
+    /// if a face that one grain writes is used by another while both are coupled.
     pub(super) fn couple_marked(
         &mut self,
         flow: &mut Flow<R>,
@@ -120,7 +120,7 @@ impl<R: Real> ImmersedGrains<R> {
             let rows = borrowed_rows(|| {
                 if update.isolated {
                     // SAFETY: `find_isolated` found no other grain that uses the faces which this
-                    // grain reads or writes. The access log asserts it below in debug builds.
+                    // grain reads or writes. The access log asserts it below in tests.
                     // `SharedRows` checks the bounds of every row.
                     let mut aliases = predictions.each_ref().map(|one| unsafe { one.alias() });
                     step.update_isolated(index, grain, update, &mut aliases, scratch);
@@ -131,7 +131,7 @@ impl<R: Real> ImmersedGrains<R> {
             });
             access.record(index, rows);
         });
-        if cfg!(debug_assertions) {
+        if ROWS_RECORDED {
             self.access.assert_no_conflict();
         }
         CoupledGrains { updates }
