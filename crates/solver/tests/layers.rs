@@ -17,7 +17,8 @@ const ALLOWED: [(&str, &[&str]); 7] = [
 ];
 
 /// Crates of the workspace that each crate may depend on.
-const CRATES: [(&str, &[&str]); 12] = [
+const CRATES: [(&str, &[&str]); 13] = [
+    ("features", &[]),
     ("simd", &[]),
     ("formats", &["simd"]),
     ("shape", &["formats"]),
@@ -30,9 +31,20 @@ const CRATES: [(&str, &[&str]); 12] = [
     ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),
     (
         "cli",
-        &["formats", "plot", "report", "run", "shape", "solver", "study", "validation", "view"],
+        &[
+            "features",
+            "formats",
+            "plot",
+            "report",
+            "run",
+            "shape",
+            "solver",
+            "study",
+            "validation",
+            "view",
+        ],
     ),
-    ("python", &["formats", "report", "run", "shape", "solver", "study", "validation"]),
+    ("python", &["features", "formats", "report", "run", "shape", "solver", "study", "validation"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
