@@ -203,6 +203,36 @@ fn light_grains_keep_momentum_to_a_step() {
     assert!(lost < 1e-3, "{lost}");
 }
 
+/// A heavy grain hits one at rest. The virtual mass of a light grain takes up a part of the impact
+/// and returns it in the next step.
+#[test]
+fn an_impact_on_a_light_grain_keeps_the_momentum() {
+    let mut of_heavier = 0.0;
+    for ratio in [1.05, 0.95, 0.8, 0.4, 0.1, 0.02] {
+        let mut grains = vec![
+            sphere(1.0, DVec3::new(1.3, 1.5, 1.5), 2.5),
+            sphere(1.0, DVec3::new(2.5, 1.6, 1.45), ratio),
+        ];
+        grains[0].velocity = DVec3::new(1.0, 0.0, 0.0);
+        let mut case = setup([36, 24, 24], 1.0 / 8.0, [PERIODIC; 3], 0.005, grains);
+        case.contact.restitution = 0.9;
+        let mut sim = Simulation::new(case).unwrap();
+        let first = sim.diagnostics().momentum;
+        let (mut touched, mut fastest) = (false, 0.0_f64);
+        while sim.time() < 1.0 {
+            sim.step(f64::INFINITY).unwrap();
+            touched |= !sim.contacts().is_empty();
+            fastest = fastest.max(sim.grains()[1].velocity.x);
+        }
+        let lost = (sim.diagnostics().momentum - first).length() / first.length();
+        println!("ratio {ratio}: lost {lost:.5}, speed {fastest:.3}");
+        assert!(touched, "ratio {ratio}");
+        assert!(lost < 0.01, "ratio {ratio}: {lost}");
+        assert!(fastest > of_heavier, "ratio {ratio}: {fastest}, {of_heavier}");
+        of_heavier = fastest;
+    }
+}
+
 #[test]
 fn light_grains_come_to_rest_under_the_ceiling() {
     let mut case = rising(Shape::sphere(0.5, 600), 0.05, 8, 0.02);

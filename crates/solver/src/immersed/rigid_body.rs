@@ -6,8 +6,8 @@
 //!
 //! The fluid around a grain responds by the projection, one step late. For a grain lighter than the
 //! fluid this delay is unstable. A virtual mass, the inertia of the displaced fluid, is therefore
-//! added to both sides of the equations: it multiplies the new acceleration on the left and the
-//! previous one on the right (`docs/decisions/0013-light-grains.md`).
+//! added to both sides of the equations: it multiplies the change of the velocities in this step on
+//! the left and that in the previous step on the right (`docs/decisions/0013-light-grains.md`).
 //!
 //! Legend: a and b matrix and right-hand side, x new velocities, J impulse on the fluid.
 
@@ -26,6 +26,8 @@ pub struct PreviousStep {
     /// Mean acceleration over the previous step [m/s^2, rad/s^2], without `added_mass_uptake`; zero
     /// after contact, and extrapolated to the next step for a grain in a free surface.
     pub acceleration: RigidVelocity,
+    /// Change of the linear velocity over the previous step [m/s], that by contact included.
+    pub change: DVec3,
     /// Part of `velocity` that contact caused in the previous step and that the added mass takes up
     /// in this step (`docs/decisions/0014-contact-with-the-fluid-response.md`).
     pub pending_added_mass_velocity: RigidVelocity,
@@ -210,10 +212,12 @@ impl RigidBodySystem {
         });
         let mut a = self.matrix;
         let least_mass = grain.mass() + added_density * grain.shape.volume();
-        let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0;
+        // The virtual mass returns its momentum in the next step.
+        let virtual_mass = if added_density > 0.0 { self.virtual_mass.mass } else { 0.0 };
+        let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0 - virtual_mass;
         if free[0] {
             for axis in 0..3 {
-                a[axis][axis] += (least_mass - mean_mass).max(0.0);
+                a[axis][axis] += (least_mass - mean_mass).max(0.0) - virtual_mass;
             }
         }
         let columns: [Vector6; 6] = std::array::from_fn(|n| {
@@ -242,7 +246,8 @@ struct VirtualMass {
     mass: f64,
     /// Virtual inertia about the centroid, space frame [kg m^2].
     inertia: DMat3,
-    /// Linear and angular momentum after a step with the previous acceleration [kg m/s, kg m^2/s].
+    /// Linear and angular momentum if the velocities change as in the previous step [kg m/s, kg
+    /// m^2/s].
     momentum: [DVec3; 2],
 }
 
@@ -267,9 +272,12 @@ impl VirtualMass {
         let part = part / density_ratio;
         let [translation, rotation] = free(grain).map(|free| if free { part } else { 0.0 });
         let (mass, inertia) = (grain.mass() * translation, grain.inertia() * rotation);
-        let PreviousStep { velocity, acceleration, .. } = previous;
+        let PreviousStep { velocity, acceleration, change, .. } = previous;
+        // The change, and not the acceleration times dt, keeps the momentum if the step varies, and
+        // after an impact.
+        let change = if in_free_surface { dt * acceleration.linear } else { *change };
         let momentum = [
-            mass * (velocity.linear + dt * acceleration.linear),
+            mass * (velocity.linear + change),
             inertia * (velocity.angular + dt * acceleration.angular),
         ];
         VirtualMass { mass, inertia, momentum }

@@ -256,6 +256,7 @@ impl Projected<'_> {
                 None => density * grain.shape.volume() * change.linear - dt * load.force,
                 Some(impulse) => impulse,
             };
+            previous.change = change.linear;
             let touched = !data.contact[i].is_zero();
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.

@@ -32,6 +32,7 @@ impl Simulation {
             save_rates(previous.acceleration, &mut out)?;
             save_rates(previous.pending_added_mass_velocity, &mut out)?;
             save_rates(previous.added_mass_uptake, &mut out)?;
+            out.vector(previous.change)?;
         }
         if let Some(fluid) = &self.fluid {
             out.vector(self.data.momentum_residual)?;
@@ -69,6 +70,7 @@ impl Simulation {
             previous.acceleration = restore_rates(&mut input)?;
             previous.pending_added_mass_velocity = restore_rates(&mut input)?;
             previous.added_mass_uptake = restore_rates(&mut input)?;
+            previous.change = input.vector()?;
         }
         if let Some(fluid) = &mut self.fluid {
             data.momentum_residual = input.vector()?;

@@ -1,8 +1,7 @@
 //! Equations of motion of a grain with the impulse of the fluid (Eqs 4b, 4c, 5).
 //!
 //! Legend: m mass, I inertia, m_f and I_f mass and inertia of the displaced fluid, m_v and I_v
-//! virtual mass and inertia, V and Omega velocities, a previous acceleration, J impulse on the
-//! fluid.
+//! virtual mass and inertia, V and Omega velocities, J impulse on the fluid.
 
 use glam::DVec3;
 
@@ -14,8 +13,9 @@ impl Reference {
     /// Residual of the momentum [N s] and angular momentum [N m s] of grain `index` in a step from
     /// the previous velocities to `new`, under the `load` of weight, buoyancy and contact:
     ///
-    /// (m - m_f)(V - V_old) + m_v (V - V_old - dt a) + J - dt F = 0, and the same with I, Omega and
-    /// the gyroscopic torque Omega_old x (I - I_f) Omega_old.
+    /// (m - m_f)(V - V_old) + m_v (V - V_old - previous change) + J - dt F = 0, and the same with
+    /// I, Omega, the previous acceleration times dt, and the gyroscopic torque
+    /// Omega_old x (I - I_f) Omega_old.
     pub fn momentum_residual(
         &self,
         index: usize,
@@ -34,7 +34,7 @@ impl Reference {
         let omega = previous.velocity.angular;
         let inertia = grain.inertia();
         let gyroscopic = omega.cross(own_part * (inertia * omega));
-        let linear = own_part * change.linear + virtual_part * (change.linear - dt * rate.linear);
+        let linear = own_part * change.linear + virtual_part * (change.linear - previous.change);
         let angular =
             own_part * change.angular + virtual_part * (change.angular - dt * rate.angular);
         [

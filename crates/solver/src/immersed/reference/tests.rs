@@ -359,6 +359,7 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             let previous = PreviousStep {
                 velocity: grain.rigid_velocity(),
                 acceleration: ACCELERATION,
+                change: DVec3::new(0.02, -0.01, 0.03),
                 ..Default::default()
             };
             let [applied, contact] = [1.0, -0.3].map(|factor| Load {
