@@ -55,7 +55,7 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     let thin = |(n, thin): &(f64, f64)| *thin < 0.95 * n;
     let shortest = e.cells_per_diameter.zip(e.cells_across_shortest_axis).filter(thin);
     rows.extend(with_unit("cells across shortest axis", shortest.map(|(_, thin)| thin), ""));
-    if let Some((error, reynolds)) = e.drag_error.zip(e.reynolds) {
+    if let Some((error, reynolds)) = e.drag_error.zip(e.largest_reynolds()) {
         let [five, two] = [0.05, 0.02].map(|error| cells_for_drag_error(error, reynolds));
         let error = drag_error_text(error, 1);
         let text = format!("{error} expected; at most 5 % from {five} cells, 2 % from {two}");
@@ -67,6 +67,8 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.extend(with_unit("Galileo number", e.galileo, &which));
     let sphere = "(sphere of equal volume)";
     rows.extend(with_unit("expected Reynolds number", e.reynolds, sphere));
+    let faster = e.start_reynolds.filter(|re| *re > e.reynolds.unwrap_or(0.0));
+    rows.extend(with_unit("Reynolds number at the start", faster, ""));
     let speed = e.settling_speed_m_per_s.map(|v| 1e3 * v);
     let unit = "mm/s (settling or rising)";
     rows.extend(with_unit("expected speed", speed, unit));

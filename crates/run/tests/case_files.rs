@@ -1183,11 +1183,22 @@ fn prescribed_motions_count_in_the_expected_step() {
     let diagonal = step("{ velocity = [0.3, -0.4, 0.3] }");
     assert!((diagonal / fast - 1.0).abs() < 0.1, "{diagonal}");
     // A sine has 2 / pi of its largest speed on average.
-    for periods in [1, 100, 200, 987, 2584] {
-        let sine = format!("{{ velocity = {{ formula = [0, 0, \"sin({periods}*TAU*t)\"] }} }}");
-        let sine = step(&sine);
+    let sine =
+        |periods: i32| format!("{{ velocity = {{ formula = [0, 0, \"sin({periods}*TAU*t)\"] }} }}");
+    for periods in [1, 100, 144, 200] {
+        let sine = step(&sine(periods));
         assert!(sine > 1.2 * fast && sine < 1.9 * fast, "{periods}: {sine} {fast}");
     }
+    // A fast one has 20 steps in a period; a longer step that is given is warned of.
+    for periods in [987, 2584] {
+        let part = step(&sine(periods)) * f64::from(periods);
+        assert!((0.04..0.051).contains(&part), "{periods}: {part}");
+    }
+    let follows = |step: &str| {
+        let fixed = moved_with(&sine(987), &format!("end = \"1 s\"\nstep = \"{step}\""));
+        fixed.estimate(1).warnings.iter().all(|w| !w.contains("do not follow"))
+    };
+    assert!(follows("0.05 ms") && !follows("0.2 ms"));
     let spin = step("{ velocity = \"fixed\", angular_velocity = [0, 0, 1000] }");
     assert!((spin / fast - 1.0).abs() < 0.1, "{spin}");
     // The largest speed limits a fixed step; at the start it is zero.

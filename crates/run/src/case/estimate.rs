@@ -55,13 +55,16 @@ pub struct Estimate {
     pub galileo_grain: Option<usize>,
     /// Settling Reynolds number of the equal-volume sphere at that Galileo number.
     pub reynolds: Option<f64>,
+    /// Largest Reynolds number of the velocity of a grain relative to the fluid at the start.
+    pub start_reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
     pub settling_speed_m_per_s: Option<f64>,
     /// Cells across the smallest equivalent diameter, on the refined grid if there is one.
     pub cells_per_diameter: Option<f64>,
     /// Cells across the shortest axis of the thinnest grain.
     pub cells_across_shortest_axis: Option<f64>,
-    /// Relative error of the drag expected on this grid, see [`drag_error`].
+    /// Relative error of the drag expected on this grid at the larger Reynolds number, see
+    /// [`drag_error`].
     pub drag_error: Option<f64>,
     /// Blocked part of the cross-section normal to gravity, largest grain.
     pub blockage: Option<f64>,
@@ -130,7 +133,8 @@ impl Estimate {
         let cells_per_diameter = (fluid.is_some() && smallest.is_finite())
             .then(|| smallest / setup.finest_spacing().max_element());
         let reynolds = galileo.map(settling_reynolds);
-        Estimate {
+        let start_reynolds = start_reynolds(setup);
+        let mut estimate = Estimate {
             cells,
             refined_cells,
             expected_end_s,
@@ -143,19 +147,39 @@ impl Estimate {
             galileo,
             galileo_grain: largest.map(|(index, ..)| index),
             reynolds,
+            start_reynolds,
             settling_speed_m_per_s: speed,
             cells_per_diameter,
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
                 .then(|| shortest_axis(setup) / setup.finest_spacing().max_element()),
-            drag_error: cells_per_diameter.zip(reynolds).map(|(n, re)| drag_error(n, re)),
+            drag_error: None,
             blockage: blockage(setup),
             contact_time_s,
             contact_substeps,
             contact_share: contact_s / (step_s + contact_s).max(f64::MIN_POSITIVE),
             wall_s: steps * (step_s + contact_s),
             warnings: Vec::new(),
-        }
+        };
+        let numbers = cells_per_diameter.zip(estimate.largest_reynolds());
+        estimate.drag_error = numbers.map(|(n, re)| drag_error(n, re));
+        estimate
     }
+
+    /// Returns the larger of the Reynolds numbers of settling and at the start.
+    pub fn largest_reynolds(&self) -> Option<f64> {
+        self.reynolds.into_iter().chain(self.start_reynolds).reduce(f64::max)
+    }
+}
+
+/// Returns the largest Reynolds number of the velocity of a grain relative to the fluid at the
+/// start; none without fluid, and where a formula gives its velocity.
+fn start_reynolds(setup: &Setup) -> Option<f64> {
+    let fluid = setup.fluid.filter(|_| setup.prescription.initial_velocity.is_none())?;
+    let of = |grain: &Grain| {
+        let speed = grain.velocity.distance(fluid.initial_velocity);
+        speed * grain.shape.equivalent_diameter() / fluid.kinematic_viscosity
+    };
+    setup.grains.iter().map(of).reduce(f64::max)
 }
 
 /// Error of the drag where the boundary layer is resolved, at 8 cells per diameter. It falls slowly

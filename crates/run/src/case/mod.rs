@@ -30,6 +30,7 @@ mod settling;
 mod shapes;
 mod source;
 mod suggest;
+mod time_scale;
 mod toml_messages;
 mod units;
 mod validate;

@@ -8,7 +8,9 @@ use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::EventParams;
-use grainwake_solver::sim::{Setup, StepRule};
+use grainwake_solver::sim::{Prescription, Setup, StepRule};
+
+use super::time_scale::{resolved_step, spread_times};
 
 /// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
 /// At a tenth of this ratio some grains become unstable.
@@ -179,7 +181,6 @@ pub(super) fn expected_time_step(setup: &Setup, settling: f64, end: f64) -> f64 
 /// counts in the CFL number [m/s], at times spread over the run until `end` [s]; at one time, if no
 /// motion is a formula.
 pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
-    const GOLDEN_RATIO: f64 = 1.618_033_988_749_895;
     let times = if setup.prescription.motions.is_empty() { 1 } else { 200 };
     let mut driven: Vec<Grain> = setup.grains.clone();
     let prescribed = |constraint: MotionConstraint| match constraint {
@@ -190,15 +191,11 @@ pub(super) fn prescribed_speeds(setup: &Setup, end: f64) -> Vec<f64> {
         let spin = prescribed(grain.rotation).length() * grain.shape.bounding_radius();
         prescribed(grain.translation).abs().element_sum() + spin
     };
-    let at = |n: usize| {
-        // One time in each of equal parts of the run, at a place that changes from part to part:
-        // equal intervals would alias a periodic motion.
-        let place = ((n * n) as f64 * GOLDEN_RATIO).fract();
-        let time = (n as f64 + place) / times as f64 * end;
+    let at = |time: f64| {
         setup.prescription.prescribe_motion(&mut driven, time);
         driven.iter().map(of).fold(0.0, f64::max)
     };
-    (0..times).map(at).collect()
+    spread_times(times, end).map(at).collect()
 }
 
 /// Returns the step that the rule allows at `speed` [s].
@@ -238,18 +235,19 @@ fn step_at(setup: &Setup) -> impl Fn(f64) -> f64 {
 }
 
 /// Returns the default of the longest step [s]: gravity moves a grain by one cell (dry: a fiftieth
-/// of its diameter) from rest in this time.
+/// of its diameter) from rest in this time, and the step follows the formulas of time.
 pub(super) fn default_max_step(
     mesh_spacing: DVec3,
     grains: &[Grain],
     gravity: DVec3,
+    prescription: &Prescription,
     dry: bool,
     end: f64,
 ) -> f64 {
     let g = gravity.length();
     let length = if dry { smallest_diameter(grains) / 50.0 } else { mesh_spacing.min_element() };
     let step = if g > 0.0 && length.is_finite() { (2.0 * length / g).sqrt() } else { end / 100.0 };
-    step.min(end)
+    resolved_step(prescription, end, step.min(end))
 }
 
 /// Returns whether the grain moves freely.

@@ -23,7 +23,7 @@ pub struct RawTime {
     pub cfl: Option<Located<Quantity<Number>>>,
     /// Limit of nu dt sum 1 / h_a^2; 0.2 where it is not given.
     pub viscous: Option<Located<Quantity<Number>>>,
-    /// Longest step [s]; from gravity and cell size (dry: diameter) if not given.
+    /// Longest step [s]; from gravity, cell size (dry: diameter) and formulas if not given.
     pub max_step: Option<Located<Quantity<Time>>>,
     /// Ends the run before `end`: "landing" (every grain has touched the floor), "rest" (every
     /// grain has landed and lies still) or "separation" (a pair has parted after kissing).

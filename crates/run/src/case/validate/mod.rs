@@ -133,7 +133,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, state);
     let margin = domain::refinement_margin(check, &raw.domain, refinement, &mesh);
     let spacing = mesh.spacing / refinement.max(1) as f64;
-    let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, dry);
+    let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, &prescription, dry);
     let setup = Setup::new(mesh)
         .with_boundaries(boundaries.0)
         .with_fluid(fluid)

@@ -12,7 +12,7 @@ use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::StopWhen;
-use grainwake_solver::sim::{Setup, StepRule};
+use grainwake_solver::sim::{Prescription, Setup, StepRule};
 
 /// Smallest plausible step over the step at the settling speed: velocities 1000 times larger mean
 /// instability.
@@ -27,6 +27,7 @@ pub(super) fn step(
     spacing: glam::DVec3,
     grains: &[Grain],
     gravity: glam::DVec3,
+    prescription: &Prescription,
     dry: bool,
 ) -> Option<StepRule> {
     let end = check.positive(&raw.end, "the end of the run")?;
@@ -50,7 +51,7 @@ pub(super) fn step(
     let viscous = raw.viscous.get_or_insert_with(|| number(default_viscous));
     // Above 0.216 the two-step extrapolation of diffusion is unstable at a wall.
     let viscous = check.within(viscous, 1e-6, 0.21);
-    let longest = || default_max_step(spacing, grains, gravity, dry, end);
+    let longest = || default_max_step(spacing, grains, gravity, prescription, dry, end);
     let max_step = (raw.max_step).get_or_insert_with(|| Quantity::new(longest()).into());
     let max_step = check.positive(max_step, "the longest step");
     Some(StepRule::Limits { cfl: cfl?, viscous: viscous?, max_step: max_step? })

@@ -2,6 +2,7 @@
 
 use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
 use crate::case::settling::{is_free, prescribed_speeds, time_step};
+use crate::case::time_scale::resolved_step;
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::immersed::Scheme;
@@ -21,6 +22,8 @@ const UNSTABLE_CFL: f64 = 1.0;
 const COARSE: f64 = 8.0;
 /// Estimated error of the drag from which the resolution is a reason for a warning.
 const LARGEST_DRAG_ERROR: f64 = 0.05;
+/// Step over the longest one that follows the formulas from which it is a reason for a warning.
+const LONGEST_FORMULA_STEP: f64 = 2.0;
 /// Steps over which single-precision rounding errors of one sign add up to 0.3 %.
 const MOST_SINGLE_STEPS: u64 = 50_000;
 
@@ -36,7 +39,7 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     if let Some(n) = e.cells_across_shortest_axis.map(printed).filter(|n| *n < THIN) {
         found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; {finer}"));
     }
-    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.reynolds) {
+    if let (Some(n), Some(re)) = (e.cells_per_diameter, e.largest_reynolds()) {
         let error = THIN_LAYER_DRAG_ERROR * re / (n * n);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
@@ -78,6 +81,7 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     }
     found.extend(contact_cost(setup, e));
     found.extend(first_step(setup));
+    found.extend(unresolved_formulas(setup, e));
     if let StepRule::Fixed(step) = setup.step {
         let limits = setup.clone().with_step(StepRule::Limits {
             cfl: 0.6,
@@ -123,6 +127,19 @@ fn contact_cost(setup: &Setup, e: &Estimate) -> Option<String> {
         format!(
             "contact takes {:.0} % of the wall time ({substeps:.0} sub-steps per step): {stiffness}, fewer nodes per grain or fewer substeps_per_contact are cheaper",
             100.0 * e.contact_share
+        )
+    })
+}
+
+/// Steps that are too long for the formulas of time.
+fn unresolved_formulas(setup: &Setup, e: &Estimate) -> Option<String> {
+    let step = e.time_step_s;
+    let resolved = resolved_step(&setup.prescription, e.expected_end_s, step);
+    (step > LONGEST_FORMULA_STEP * resolved).then(|| {
+        format!(
+            "steps of {} do not follow the prescribed motions or the body acceleration: a [time] max_step of {} does",
+            quantity(step, "s"),
+            quantity(resolved, "s")
         )
     })
 }
