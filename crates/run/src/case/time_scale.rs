@@ -14,8 +14,8 @@ const TRIES: usize = 2000;
 const SHORTER: f64 = 0.8;
 /// Shortest length over the run.
 const SHORTEST: f64 = 1e-9;
-/// Places within a step at which the deviation is taken. Irrational ones do not alias a formula whose
-/// period divides the step.
+/// Places within a step at which the deviation is taken. Irrational ones do not alias a formula
+/// whose period divides the step.
 const PLACES: [f64; 3] = [0.236_067_977_5, 0.414_213_562_4, 0.732_050_807_6];
 
 /// Returns the longest step [s], at most `longest`, that follows the body acceleration and the
