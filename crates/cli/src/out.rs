@@ -3,6 +3,7 @@
 
 use std::io::{ErrorKind, Write};
 use std::ops::Range;
+use std::path::Path;
 
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -26,6 +27,21 @@ pub fn write(bytes: &[u8]) -> Result<(), Exit> {
 pub fn say(text: std::fmt::Arguments) {
     let line = format!("{text}\n");
     let _ = std::io::stderr().write_all(line.as_bytes());
+}
+
+/// Returns a path as one word of a shell command.
+pub fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
+    if text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+#[test]
+fn paths_are_one_word_of_a_shell() {
+    let word = |path: &str| shell_word(Path::new(path));
+    assert_eq!(word("runs/fall_2.a"), "runs/fall_2.a");
+    assert_eq!(word("my runs/it's"), r"'my runs/it'\''s'");
 }
 
 /// Returns names and values as a text of two columns.

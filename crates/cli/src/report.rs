@@ -6,6 +6,7 @@ use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
 use crate::exit::{BAD_INPUT, Exit, IO};
+use crate::out::shell_word;
 use crate::progress::count;
 use crate::{print, tell};
 
@@ -64,7 +65,7 @@ fn film(args: &ReportArgs) -> Result<(), Exit> {
     tell!(
         "video: ffmpeg -framerate {:.4} -i {} -pix_fmt yuv420p film.mp4",
         1.0 / film.delay,
-        film.folder.join("frame-%04d.png").display()
+        shell_word(&film.folder.join("frame-%04d.png"))
     );
     print(&format!(
         "{} ({width} x {height} pixels, {})",

@@ -11,6 +11,7 @@ use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
 use crate::args::RunArgs;
 use crate::exit::{Exit, INTERRUPTED, MISSED};
+use crate::out::shell_word;
 use crate::progress::{self, count};
 use crate::{check, expect, kind, print, signals, tell, threads};
 
@@ -61,7 +62,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
                 message,
                 format!(
                     "continue with: grainwake run {} --resume{}",
-                    out.join(RESOLVED).display(),
+                    shell_word(&out.join(RESOLVED)),
                     args.threads.map_or(String::new(), |n| format!(" --threads {n}"))
                 ),
             ))

@@ -144,7 +144,9 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     if stopped {
         return Err(Exit::with_help(
             INTERRUPTED,
-            format!("interrupted with {open} runs unfinished; checkpoints were written"),
+            format!(
+                "interrupted with {open} runs unfinished; those that had started have a checkpoint"
+            ),
             "continue with the same command",
         ));
     }

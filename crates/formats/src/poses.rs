@@ -21,6 +21,8 @@ use crate::table::Table;
 
 /// Columns of `grains.csv` that say nothing about a pose.
 const IGNORED: [&str; 7] = ["fx", "fy", "fz", "tx", "ty", "tz", "contacts"];
+/// End of the names of columns in other units, which repeat those of `grains.csv`.
+const SCALED: &str = "_scaled";
 /// Columns that are read.
 const READ: &str =
     "time, grain, x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz, equivalent_diameter, density";
@@ -66,7 +68,11 @@ pub struct Poses {
 pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
     let table = Table::read(file, &mut Vec::new())?;
     let known = || READ.split(", ").chain(IGNORED);
-    if let Some(name) = table.names().iter().find(|name| !known().any(|known| known == **name)) {
+    let is_known = |name: &str| {
+        let name = name.strip_suffix(SCALED).unwrap_or(name);
+        known().any(|known| known == name)
+    };
+    if let Some(name) = table.names().iter().find(|name| !is_known(name)) {
         let what = format!("unknown column '{name}'; known are {READ}");
         return Err(FormatError::line(file, 1, what));
     }
@@ -211,6 +217,9 @@ mod tests {
         assert_eq!(of(text, Some(0.0)).unwrap().rows_before, None);
         let early = of(text, Some(-1.0)).unwrap_err();
         assert!(early.contains("the first rows are at 0 s"), "{early}");
+        // Columns in other units are left out.
+        let scaled = of("time,x,y,z,time_scaled,x_scaled\n0,1,2,3,4,5\n", None).unwrap();
+        assert_eq!(scaled.poses[0].position, DVec3::new(1.0, 2.0, 3.0));
     }
 
     #[test]

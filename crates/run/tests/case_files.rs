@@ -1150,11 +1150,19 @@ fn a_landing_needs_a_floor() {
 }
 
 #[test]
-fn rest_needs_gravity() {
-    let rest = PAIR.replace("end = \"1 s\"", "end = \"1 s\"\nstop = \"rest\"");
-    good(&rest);
-    let found = problems(&rest.replace("title = \"pair\"", "gravity = [0, 0, 0]"));
-    assert!(found[0].to_string().contains("gravity is zero"), "{}", found[0]);
+fn rest_and_landing_need_gravity() {
+    for stop in ["rest", "landing"] {
+        let text = PAIR.replace("end = \"1 s\"", &format!("end = \"1 s\"\nstop = \"{stop}\""));
+        good(&text);
+        let found = problems(&text.replace("title = \"pair\"", "gravity = [0, 0, 0]"));
+        assert!(found[0].to_string().contains("gravity is zero"), "{}", found[0]);
+    }
+}
+
+#[test]
+fn a_density_that_no_matter_has_is_refused() {
+    let found = problems(&PAIR.replacen("density = \"1500 kg/m3\"", "density = 1e20", 1));
+    assert!(found[0].to_string().contains("the density of a grain is 1e20"), "{}", found[0]);
 }
 
 #[test]

@@ -34,6 +34,11 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         may_write(output, args.new.common.force)?;
     } else {
         folder(output)?;
+        if args.preview.is_none() {
+            for file in earlier(output).iter().chain(&tables(output)) {
+                may_write(file, args.new.common.force)?;
+            }
+        }
     }
     let (mut how, diameter) = (how(args)?, diameter(&args.new)?);
     if let Some(picture) = &args.preview {
@@ -184,18 +189,19 @@ fn earlier(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// Table, contact sheet and label image of a folder of grains.
+fn tables(place: &Path) -> [PathBuf; 3] {
+    ["table.csv", "sheet.png", "labels.tif"].map(|name| place.join(name))
+}
+
 /// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
 /// labels with the reason.
 fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exit> {
     let Scan { mut grains, labels, refusals, .. } = scan;
     let place = &args.new.output;
     let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
-    let (table, sheet, image) =
-        (place.join("table.csv"), place.join("sheet.png"), place.join("labels.tif"));
+    let [table, sheet, image] = tables(place);
     let earlier = earlier(place);
-    for file in &earlier {
-        may_write(file, args.new.common.force)?;
-    }
     if let Some(diameter) = diameter {
         for grain in &mut grains {
             if let Ok(shape) = &mut grain.shape {
@@ -212,7 +218,6 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     }
     for file in [&table, &sheet, &image] {
         not_input(file, &args.image)?;
-        may_write(file, args.new.common.force)?;
     }
     // Grains of an earlier command are not part of the new table and label image.
     for file in earlier.iter().filter(|_| largest.is_some()) {

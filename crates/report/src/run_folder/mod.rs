@@ -3,7 +3,7 @@
 mod facts;
 mod history;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -137,11 +137,37 @@ impl RunFolder {
             run.events = damage.accept(read, FILE, &mut notes)?.unwrap_or_default();
         }
         run.notes = notes;
+        run.notes.extend(run.short_tables());
         let times = run.collection();
         run.slices = run.frames("slices", "vti", &times);
         run.fields = run.frames("fields", "vti", &times);
         run.surfaces = run.frames("grains", "vtp", &times);
         Ok(run)
+    }
+
+    /// Returns a sentence for each table that ends before the finished run: rows are missing.
+    pub fn short_tables(&self) -> Vec<String> {
+        let Some(end) = self.summary_number("end_time_s") else {
+            return Vec::new();
+        };
+        let diagnostics = self.diagnostics.as_ref().and_then(|table| table.column("time"));
+        let of_diagnostics = diagnostics.map(|times| times.last().copied());
+        // Grains that have left the box have no more rows.
+        let left = self.events.iter().filter(|event| event.kind == EventKind::Left);
+        let left: BTreeSet<usize> = left.flat_map(|event| event.grains.iter().copied()).collect();
+        let known = self.path.join("grains.csv").is_file() && left.len() < self.facts.grains.len();
+        let last = self.grains.iter().filter_map(|history| history.time.last().copied());
+        let of_grains = known.then(|| last.reduce(f64::max));
+        let tables = [("grains.csv", of_grains), ("diagnostics.csv", of_diagnostics)];
+        let short = tables.into_iter().filter_map(|(name, last)| match last? {
+            None => Some(format!("{name} has no row: the file is damaged")),
+            Some(last) if last < end * (1.0 - 1e-9) => Some(format!(
+                "{name} ends at {last} s and the run at {end} s: the file is damaged, and values \
+                 that follow from it are wrong"
+            )),
+            Some(_) => None,
+        });
+        short.collect()
     }
 
     /// Returns whether the run reached its end.
@@ -326,6 +352,20 @@ mod tests {
         assert!(run.summary.is_none());
         assert!(run.notes.iter().any(|n| n.contains("diagnostics.csv, line 3")), "{:?}", run.notes);
         assert!(run.notes.iter().any(|n| n.contains("summary.json, line 1")), "{:?}", run.notes);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_table_that_ends_before_the_run_is_noted() {
+        let folder = crate::testing::folder();
+        std::fs::write(folder.join("summary.json"), "{\"end_time_s\": 0.2}").unwrap();
+        let notes = |rows: &str| {
+            std::fs::write(folder.join("diagnostics.csv"), format!("time,gap\n{rows}")).unwrap();
+            RunFolder::open(&folder).unwrap().notes.join("; ")
+        };
+        assert!(!notes("0,1\n0.1,1\n0.2,1\n").contains("diagnostics"));
+        assert!(notes("0,1\n0.1,1\n").contains("diagnostics.csv ends at 0.1 s"));
+        assert!(notes("").contains("diagnostics.csv has no row"));
         std::fs::remove_dir_all(folder).unwrap();
     }
 

@@ -15,6 +15,8 @@ use super::time_scale::{resolved_step, spread_times};
 /// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
 /// At a tenth of this ratio some grains become unstable.
 pub(super) const LIGHTEST_FREE: f64 = 0.01;
+/// Largest density of a grain [kg/m3].
+pub(super) const HEAVIEST: f64 = 1e9;
 
 /// Returns the Galileo number sqrt(|rho_p / rho_f - 1| g d^3) / nu of a grain.
 pub fn galileo(grain: &Grain, fluid: &FluidParams, g: f64) -> f64 {

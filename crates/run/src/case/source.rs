@@ -228,6 +228,9 @@ impl Source {
                          have double brackets: [[grain]]"
                             .to_owned(),
                     ),
+                    _ if text.ends_with("found a table, expected a list") => {
+                        Some(format!("each row of this list has double brackets: [[{owner}]]"))
+                    }
                     _ => shape_help(&owner),
                 };
                 (text, "here".into(), help)

@@ -103,6 +103,10 @@ impl RunRecord {
             Ok(run) => {
                 self.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
                 self.periods_m = run.periods();
+                self.remark = run.short_tables().into_iter().next();
+                if self.remark.is_some() {
+                    return;
+                }
                 self.pair = PairMeasures::from_run(&run);
                 self.settling = SettlingMeasures::from_run(&run);
                 if self.pair.is_none() && self.settling.is_none() {
@@ -113,8 +117,8 @@ impl RunRecord {
         }
     }
 
-    /// Returns whether the run finished, but its files could not be read.
-    fn unmeasured(&self) -> bool {
+    /// Returns whether the run finished, but its files could not be read or lack rows.
+    pub fn unmeasured(&self) -> bool {
         self.finished() && self.remark.is_some()
     }
 

@@ -22,11 +22,12 @@ const HEADER: [&str; 16] = [
     "contacts",
 ];
 
-/// Reads the histories of the grains from the run folder, or else from the thinned copy.
-fn read_histories(run: &Run, study: &Path) -> Option<Vec<History>> {
-    let full = run.folder(study).join("grains.csv");
+/// Reads the histories of the grains from the run folder, or else, and for a run with damaged
+/// files, from the thinned copy.
+fn read_histories(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec<History>> {
+    let full = (!record.unmeasured()).then(|| run.folder(study).join("grains.csv"));
     let thinned = study.join(HISTORIES).join(format!("{}.csv", run.name));
-    [full, thinned].iter().find_map(|file| histories(file, &mut Vec::new()).ok())
+    full.iter().chain([&thinned]).find_map(|file| histories(file, &mut Vec::new()).ok())
 }
 
 /// Relative motion of a pair until the first landing, dimensionless.
@@ -43,7 +44,7 @@ pub struct Trajectory {
 impl Trajectory {
     /// Reads the trajectory of a finished run; none if the run is not a pair.
     pub fn read(run: &Run, record: &RunRecord, study: &Path) -> Option<Trajectory> {
-        let grains = read_histories(run, study)?;
+        let grains = read_histories(run, record, study)?;
         let [a, b] = grains.as_slice() else {
             return None;
         };
@@ -78,7 +79,7 @@ impl Trajectory {
 /// Reads the settling speed [m/s] against time [s], averaged over the measured grains in the box,
 /// until all landed.
 pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec<(f64, f64)>> {
-    let grains = read_histories(run, study)?;
+    let grains = read_histories(run, record, study)?;
     let (up, unit) = record.up_and_time()?;
     let settling = record.settling.as_ref()?;
     let grains: Vec<&History> =
@@ -94,7 +95,7 @@ pub fn settling_curve(run: &Run, record: &RunRecord, study: &Path) -> Option<Vec
     rows.map(|(row, time)| Some((*time, speed(row)?))).collect()
 }
 
-/// Writes the thinned history of a finished run, if its run folder exists.
+/// Writes the thinned history of a finished run, if its run folder exists and is not damaged.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -103,7 +104,8 @@ pub fn write_thinned_history(
     record: &RunRecord,
     study: &Path,
 ) -> Result<(), StudyError> {
-    let Ok(grains) = histories(&run.folder(study).join("grains.csv"), &mut Vec::new()) else {
+    let read = || histories(&run.folder(study).join("grains.csv"), &mut Vec::new());
+    let Some(Ok(grains)) = (!record.unmeasured()).then(read) else {
         return Ok(());
     };
     let interval = record.up_and_time().map_or(0.0, |(_, unit)| INTERVAL * unit);

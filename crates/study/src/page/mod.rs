@@ -144,6 +144,10 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     };
     let page = folder.join("report.html");
     write_file(&page, content.html().as_bytes())?;
+    // The page names the remarks with the runs.
+    let damaged = records.iter().filter(|record| record.unmeasured());
+    let remark = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
+    notes.extend(damaged.filter_map(remark));
     Ok(StudyReportFiles {
         page,
         png: figures.into_iter().map(|figure| figure.png_file).collect(),

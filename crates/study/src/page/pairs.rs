@@ -53,7 +53,7 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
     html! {
         p {
             @if sorted.is_empty() {
-                "No finished run has a " (what) "."
+                "No finished run has a " (what) " before the grains landed."
             } @else {
                 b { "Shortest " (what) } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."

@@ -66,6 +66,7 @@ fn stretch(from: &Path, to: &Path, factor: f64) {
         std::fs::copy(from.join(name), to.join(name)).unwrap();
     }
     let mut summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
+    summary["end_time_s"] = (summary["end_time_s"].as_f64().unwrap() * factor).into();
     summary["max_cfl"] = 0.3.into();
     summary["ended_by"] = "landing".into();
     summary["phase"] = "separated".into();

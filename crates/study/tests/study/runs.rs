@@ -282,12 +282,22 @@ fn a_finished_run_with_damaged_files_keeps_its_values() {
     write_tables(&before, &study).unwrap();
     let file = plan.runs[0].folder(&study).join("grains.csv");
     let text = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(&file, text.replacen(',', ";", 40)).unwrap();
-    let after = records(&plan, &study).unwrap();
-    let remark = after[0].remark.clone().unwrap();
-    assert!(remark.contains("grains.csv"), "{remark}");
-    assert_eq!(after[0].pair, before[0].pair);
+    let history =
+        || std::fs::read(study.join(format!("histories/{}.csv", plan.runs[0].name))).unwrap();
     render(&study).unwrap();
+    let thinned = history();
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let [half, header] = [lines.len() / 2, 1].map(|count| lines[..count].concat());
+    for damaged in [half, header, text.replacen(',', ";", 40)] {
+        std::fs::write(&file, damaged).unwrap();
+        let after = records(&plan, &study).unwrap();
+        let remark = after[0].remark.clone().unwrap();
+        assert!(remark.contains("grains.csv"), "{remark}");
+        assert_eq!(after[0].pair, before[0].pair);
+        let notes = render(&study).unwrap().notes;
+        assert!(notes.iter().any(|note| note.contains("grains.csv")), "{notes:?}");
+        assert_eq!(history(), thinned);
+    }
     let page = std::fs::read_to_string(study.join("report.html")).unwrap();
     assert!(page.contains("grains.csv"), "the page names the damage");
     assert_eq!(records(&plan, &study).unwrap()[0].pair, before[0].pair);

@@ -104,6 +104,13 @@ fn a_missing_table_is_named() {
 }
 
 #[test]
+fn a_table_instead_of_a_row_of_a_list_is_explained() {
+    let text = CASE.replacen("[[grain]]", "[grain]", 1);
+    let help = problem(&text, &[]).help.unwrap();
+    assert!(help.contains("[[grain]]"), "{help}");
+}
+
+#[test]
 fn kinds_of_values_have_plain_names() {
     for (set, words) in [
         ("run.threads=-1", "found -1, expected a whole number, zero or more"),

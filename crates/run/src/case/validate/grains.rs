@@ -11,7 +11,7 @@ use crate::case::located::{Located, Span};
 use crate::case::placement::{extent_along, orientation};
 use crate::case::quantity::{Density, Kind, Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawGrain, Turns};
-use crate::case::settling::LIGHTEST_FREE;
+use crate::case::settling::{HEAVIEST, LIGHTEST_FREE};
 use crate::case::shapes::{DEFAULT_NODES, Library};
 use crate::number_format::{AXES, number, quantity, vector};
 use grainwake_solver::dem::{Grain, MotionConstraint};
@@ -84,6 +84,7 @@ impl<'a> Grains<'a> {
         let mut resolved = raw.value.clone();
         let shape = shape(check, &mut self.library, raw, &mut resolved);
         let density = check.positive(&raw.density, "the density of a grain");
+        let density = density.filter(|density| not_too_heavy(check, &raw.density, *density));
         if raw.motion.velocity == MotionLaw::Free {
             not_too_light(check, &raw.density, fluid_density);
         }
@@ -176,6 +177,16 @@ impl<'a> Grains<'a> {
         };
         self.resolved.iter().enumerate().filter_map(motion).collect()
     }
+}
+
+/// Refuses a density [kg/m3] that no matter has, also in units of the fluid's density. Contact is
+/// then too stiff for any step.
+fn not_too_heavy(check: &mut Checker, raw: &Located<Quantity<Density>>, density: f64) -> bool {
+    if density > HEAVIEST {
+        let message = format!("the density of a grain is {}", quantity(density, "kg/m3"));
+        check.fail(&raw.span, message, format!("accepted: at most {HEAVIEST:e} kg/m3"));
+    }
+    density <= HEAVIEST
 }
 
 /// Refuses a free grain that is too light for the coupling with a fluid of this density [kg/m3].

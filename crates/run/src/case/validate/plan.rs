@@ -157,6 +157,9 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop
     } else if grains.iter().all(|grain| grain.translation != MotionConstraint::Free) {
         let message = "no grain moves freely, so this never happens";
         check.fail(&raw.span, message, "leave out `stop`");
+    } else if raw.when == StopWhen::Landing && setup.gravity == glam::DVec3::ZERO {
+        let message = "gravity is zero, so no side of the box is the floor";
+        check.fail(&raw.span, message, "leave out `stop`: the run ends at `end`");
     } else if raw.when == StopWhen::Landing && floor(setup).is_none() {
         let message = "the side to which the grains fall or rise is no wall, so none lands on it";
         check.fail(&raw.span, message, "leave out `stop`, or close the side with \"wall\"");

@@ -51,8 +51,11 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         }
     }
     if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
+        let along = setup.gravity.abs();
+        let vertical =
+            (0..3).find(|axis| along[*axis] > 0.0 && along[*axis] == along.max_element());
         let closed =
-            (0..3).any(|axis| !setup.boundaries.is_periodic(axis) && setup.gravity[axis] == 0.0);
+            (0..3).any(|axis| Some(axis) != vertical && !setup.boundaries.is_periodic(axis));
         let what =
             if closed { "the walls slow the grains" } else { "the grain feels its own images" };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
