@@ -135,6 +135,27 @@ fn residual(across: usize) -> [f64; 2] {
 }
 
 #[test]
+fn a_collision_keeps_the_momentum_up_to_the_sides_of_the_box() {
+    let mut grains = vec![sphere(2.5, [1.4, 2.0, 2.0]), sphere(1.5, [2.6, 2.1, 1.95])];
+    grains[0].velocity = DVec3::X;
+    let case = setup([5, 4, 4], 8, 0.01, grains).with_refinement(2);
+    let case = case.with_boundaries([PERIODIC; 3]).with_gravity(DVec3::ZERO);
+    let mut sim = Simulation::new(case).unwrap();
+    let first = sim.diagnostics().momentum;
+    let (mut touched, mut before, mut largest) = (false, first, 0.0_f64);
+    while sim.time() < 1.0 {
+        step(&mut sim);
+        touched |= !sim.contacts().is_empty();
+        let momentum = sim.diagnostics().momentum;
+        largest = largest.max(momentum.distance(before));
+        before = momentum;
+    }
+    let [lost, largest] = [before.distance(first), largest].map(|p| p / first.length());
+    println!("momentum lost: {lost:.2e}, at most {largest:.2e} in a step");
+    assert!(touched && lost < 0.004 && largest < 0.002, "{lost}, {largest}");
+}
+
+#[test]
 fn momentum_is_conserved_up_to_the_sides_of_the_box() {
     let [[coarse, largest], [fine, _]] = [6, 12].map(residual);
     println!(

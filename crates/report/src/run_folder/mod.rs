@@ -160,11 +160,10 @@ impl RunFolder {
         let of_grains = known.then(|| last.reduce(f64::max));
         let tables = [("grains.csv", of_grains), ("diagnostics.csv", of_diagnostics)];
         let short = tables.into_iter().filter_map(|(name, last)| match last? {
-            None => Some(format!("{name} has no row: the file is damaged")),
-            Some(last) if last < end * (1.0 - 1e-9) => Some(format!(
-                "{name} ends at {last} s and the run at {end} s: the file is damaged, and values \
-                 that follow from it are wrong"
-            )),
+            None => Some(format!("{name} has no rows: the file is damaged")),
+            Some(last) if last < end * (1.0 - 1e-9) => {
+                Some(format!("{name} ends at {last} s and the run at {end} s: rows are missing"))
+            }
             Some(_) => None,
         });
         short.collect()
@@ -365,7 +364,7 @@ mod tests {
         };
         assert!(!notes("0,1\n0.1,1\n0.2,1\n").contains("diagnostics"));
         assert!(notes("0,1\n0.1,1\n").contains("diagnostics.csv ends at 0.1 s"));
-        assert!(notes("").contains("diagnostics.csv has no row"));
+        assert!(notes("").contains("diagnostics.csv has no rows"));
         std::fs::remove_dir_all(folder).unwrap();
     }
 

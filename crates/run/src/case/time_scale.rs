@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn ramps_and_jumps_do_not_stop_the_run() {
-        // The ramp ends after a thousandth of the run.
+        // The first ramp takes a thousandth of the run.
         assert!(step("(1+tanh(1000*(t-5)))/2", 10.0, 0.1) > 0.05);
         assert!(step("abs(t-5)-abs(t-5.5)", 10.0, 10.0) > 0.05);
         assert!(step("signum(t-5)", 10.0, 10.0) > 0.05);

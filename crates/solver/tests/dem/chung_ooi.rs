@@ -181,6 +181,27 @@ fn test_3_normal_impact_with_restitution() {
     }
 }
 
+/// A step is longer than the contact, as in a run.
+#[test]
+fn restitution_with_the_default_substeps() {
+    let modulus = 1e7;
+    for (restitution, bound) in [(0.9, 0.002), (0.5, 0.006), (0.1, 0.006)] {
+        let material = Material { restitution, ..material(modulus, 0.3) };
+        let mut ball = grain(0.001, 2500.0, material, DVec3::Z * 0.001);
+        ball.velocity.z = -0.3;
+        let duration = hertz(ball.mass(), 0.001, modulus / (1.0 - 0.09), 0.3).duration;
+        let substeps_per_contact = ContactParams::default().substeps_per_contact;
+        let params = ContactParams { substeps_per_contact, ..hertz_mindlin(0.0) };
+        let mut dynamics = ContactDynamics::new(params, floor());
+        let mut grains = [ball];
+        dynamics.advance(&mut grains, &[], 4.0 * duration, &mut [Load::default()]);
+        assert!(dynamics.substeps() < 200, "{}", dynamics.substeps());
+        let found = grains[0].velocity.z / 0.3;
+        println!("restitution {restitution}: {found:.4}");
+        assert!((found - restitution).abs() < bound, "{restitution}: {found}");
+    }
+}
+
 #[test]
 fn test_4_oblique_impact_at_constant_speed() {
     let oxide = (material(3.8e11, 0.23), 4000.0, "Test4_al_oxide");

@@ -179,8 +179,8 @@ impl<'a> Grains<'a> {
     }
 }
 
-/// Refuses a density [kg/m3] that no matter has, also in units of the fluid's density. Contact is
-/// then too stiff for any step.
+/// Refuses a density above [`HEAVIEST`]: no matter has it, and contact would be too stiff for any
+/// step.
 fn not_too_heavy(check: &mut Checker, raw: &Located<Quantity<Density>>, density: f64) -> bool {
     if density > HEAVIEST {
         let message = format!("the density of a grain is {}", quantity(density, "kg/m3"));

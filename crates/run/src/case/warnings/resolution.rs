@@ -140,7 +140,7 @@ fn unresolved_formulas(setup: &Setup, e: &Estimate) -> Option<String> {
     let resolved = resolved_step(&setup.prescription, e.expected_end_s, step);
     (step > LONGEST_FORMULA_STEP * resolved).then(|| {
         format!(
-            "steps of {} do not follow the prescribed motions or the body acceleration: a [time] max_step of {} does",
+            "steps of {} do not follow the prescribed motions or the body acceleration; steps of at most {} do",
             quantity(step, "s"),
             quantity(resolved, "s")
         )
