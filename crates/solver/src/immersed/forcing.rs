@@ -28,7 +28,7 @@ use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
 
 /// Forcing of a face by one grain, or by several together. Both fractions stay zero in the paper's
 /// scheme, whose `strength` follows from the solid fraction.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FaceForcing {
     /// Drag coefficient times dt; the weight of the rigid velocity is strength / (1 + strength).
     pub strength: f64,

@@ -15,7 +15,6 @@
 //! Irrotational flow exerts no torque on a sphere, so a sphere keeps its angular velocity; the
 //! faces inside it, which are not quite symmetric, would change it.
 
-use super::geometry::nearest_distance;
 use super::rigidity::{Impulse, sum_impulse};
 use super::update::{GrainUpdate, PendingRigidity, locate_and_compute_weights};
 use super::{ImmersedGrain, ImmersedGrains};
@@ -84,14 +83,13 @@ impl<R: Real> ImmersedGrains<R> {
         each.for_each(|(index, ImmersedGrain { body, forced, .. })| {
             let (grain, scratch) = (&grains[index], &mut scratch.borrow().locate);
             locate_and_compute_weights(locator, &params, index, grain, body, forced, scratch);
-            let (band, neighbours) = (&scratch.band, locator.neighbours(index));
+            let band = &scratch.band;
             for (weight, distance) in forced.weight[..band.count()].iter_mut().zip(&band.distance) {
                 *weight = if *distance < 0.0 { 1.0 } else { 0.0 };
             }
-            for &(entry, x) in &band.shared {
-                let nearest = nearest_distance(neighbours, &locator.shapes, x, 0.0);
-                if nearest < f64::from(band.distance[entry]) {
-                    forced.weight[entry] = 0.0;
+            for face in &band.shared {
+                if face.nearest < f64::from(band.distance[face.entry]) {
+                    forced.weight[face.entry] = 0.0;
                 }
             }
             forced.closed_fraction.fill(0.0);

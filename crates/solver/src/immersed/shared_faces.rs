@@ -29,12 +29,15 @@ use glam::DVec3;
 
 use super::Scheme;
 use super::forcing::{FaceForcing, ForcedFaces, ForcingParams, drag, parabola, pressure_weight_of};
-use super::geometry::aperture::{aperture, forcing_reach, open_depth_integral};
-use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain};
-use grainwake_simd::{Kernel, Scalar, Vector, dispatch};
+use super::geometry::aperture::{aperture, open_depth_integral};
+use super::geometry::{BandFaces, NarrowBandShapes, NeighbourGrain, SharedFace};
+use grainwake_simd::{Kernel, MAX_LANES, Scalar, Vector, dispatch};
 
 /// Least m(d_i) - m(-d_j) in a gap, over m(d_i): the shear of grains in contact remains finite.
 const LEAST_DEPTH: f64 = 0.1;
+
+/// Faces of which the surfaces are evaluated together: these fit a first-level cache.
+const FACES_AT_A_TIME: usize = 64;
 
 /// Divides the forcing of the faces that `neighbours` force too among the grains. `forced` has the
 /// weights without neighbours.
@@ -50,29 +53,34 @@ pub fn share_faces(
         return;
     }
     forced.total_closed_fraction.extend_from_slice(&forced.closed_fraction);
-    let limit = forcing_reach(params.eps);
+    // A face deep inside a grain takes the velocity of this grain alone.
+    let is_deep = |face: &&SharedFace| {
+        params.scheme == Scheme::Aperture && f64::from(band.distance[face.entry]) <= -params.eps
+    };
     let mut surfaces = Vec::new();
-    for &(entry, x) in &band.shared {
-        let (distances, normal) = band.face(entry);
-        if params.scheme == Scheme::Aperture && distances[0] <= -params.eps {
-            // A face deep inside a grain takes the velocity of this grain alone.
-            continue;
-        }
+    for faces in band.shared.chunks(FACES_AT_A_TIME) {
+        let faces = || faces.iter().filter(|face| !is_deep(face));
         surfaces.clear();
-        surfaces.push(NearSurface::new(params, distances, normal));
-        for other in neighbours {
-            let (d, gradient) = other.distance_and_gradient(shapes, x, limit);
-            if d < limit {
-                let normal = other.pose.orientation * gradient.normalize_or_zero();
-                let mean = other.mean_distance(shapes, x, d);
-                surfaces.push(NearSurface::new(params, [d, mean], normal));
-            }
+        for face in faces() {
+            let (distances, normal) = band.face(face.entry);
+            surfaces.push(NearSurface::new(distances, normal));
+            surfaces.extend(band.near[face.near.clone()].iter().map(|near| {
+                let other = &neighbours[near.neighbour];
+                let normal = other.pose.orientation * near.gradient.normalize_or_zero();
+                let mean = other.mean_distance(shapes, face.position, near.distance);
+                NearSurface::new([near.distance, mean], normal)
+            }));
         }
-        let (weight, [own, all]) = share(params, &mut surfaces);
-        forced.weight[entry] = weight as f32;
-        forced.closed_fraction[entry] = own.closed_fraction as f32;
-        forced.solid_fraction[entry] = own.solid_fraction as f32;
-        forced.total_closed_fraction[entry] = all.closed_fraction as f32;
+        evaluate(params, &mut surfaces);
+        let mut rest = &mut surfaces[..];
+        for face in faces() {
+            let near = rest.split_off_mut(..1 + face.near.len()).expect("each has its surfaces");
+            let (weight, [own, all]) = share(params, near);
+            forced.weight[face.entry] = weight as f32;
+            forced.closed_fraction[face.entry] = own.closed_fraction as f32;
+            forced.solid_fraction[face.entry] = own.solid_fraction as f32;
+            forced.total_closed_fraction[face.entry] = all.closed_fraction as f32;
+        }
     }
 }
 
@@ -80,9 +88,11 @@ pub fn share_faces(
 /// forcing of all together. The closed and the solid fraction of all are at most one.
 fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceForcing; 2]) {
     let mut open = 0.0;
-    for i in 0..surfaces.len() {
+    // The paper's scheme knows no gaps.
+    let in_gaps = if params.scheme == Scheme::Aperture { surfaces.len() } else { 0 };
+    for i in 0..in_gaps {
         let mut depth = surfaces[i].shear.depth;
-        for j in (0..surfaces.len()).filter(|&j| j != i) {
+        for j in (0..in_gaps).filter(|&j| j != i) {
             let opposed = (-surfaces[i].normal.dot(surfaces[j].normal)).max(0.0);
             depth -= opposed * surfaces[j].shear.depth_behind();
             if i < j {
@@ -90,7 +100,7 @@ fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceFor
             }
         }
         let one = &mut surfaces[i];
-        if params.scheme == Scheme::Aperture && one.forcing.strength > 0.0 {
+        if one.forcing.strength > 0.0 {
             let depth = depth.max(LEAST_DEPTH * one.shear.depth);
             one.forcing.strength = params.diffusion * one.shear.curvature / depth;
         }
@@ -141,7 +151,7 @@ fn opening(one: &NearSurface, other: &NearSurface, eps: f64) -> f64 {
 }
 
 /// Profile of a shear over one wall at a face.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct ShearProfile {
     /// Distance d from the wall [m].
     distance: f64,
@@ -159,7 +169,7 @@ impl ShearProfile {
 }
 
 /// A surface near a face.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct NearSurface {
     /// Unit normal, out of the grain.
     normal: DVec3,
@@ -176,44 +186,74 @@ struct NearSurface {
 }
 
 impl NearSurface {
-    /// Surface with the unit `normal` at a distance and a mean distance [m] from a face.
-    fn new(params: &ForcingParams, distances: [f64; 2], normal: DVec3) -> NearSurface {
-        let mut surface = NearSurface { normal, ..NearSurface::default() };
-        match params.scheme {
-            Scheme::Aperture => dispatch(Evaluate { params, distances, surface: &mut surface }),
-            Scheme::Paper => surface.forcing = params.blend(distances[0], normal),
-        }
-        surface
+    /// Surface with the unit `normal` at a distance and a mean distance [m] from a face, before
+    /// [`evaluate`].
+    fn new([distance, mean_distance]: [f64; 2], normal: DVec3) -> NearSurface {
+        let at = |distance| ShearProfile { distance, ..ShearProfile::default() };
+        let [shear, mean_shear] = [at(distance), at(mean_distance)];
+        NearSurface { normal, shear, mean_shear, ..NearSurface::default() }
     }
 }
 
-/// Evaluates one surface with the instruction set in use, in which fused products are instructions.
+/// Evaluates each of the `surfaces` alone.
+fn evaluate(params: &ForcingParams, surfaces: &mut [NearSurface]) {
+    match params.scheme {
+        Scheme::Aperture => dispatch(Evaluate { params, surfaces }),
+        Scheme::Paper => surfaces.iter_mut().for_each(|surface| {
+            surface.forcing = params.blend(surface.shear.distance, surface.normal);
+        }),
+    }
+}
+
+/// Evaluates surfaces in full registers.
 struct Evaluate<'a> {
     params: &'a ForcingParams,
-    distances: [f64; 2],
-    surface: &'a mut NearSurface,
+    surfaces: &'a mut [NearSurface],
 }
 
 impl Kernel for Evaluate<'_> {
     type Number = f64;
     #[inline(always)]
     fn run<V: Vector<Number = f64>>(self) {
-        let Evaluate { params, distances, surface } = self;
+        let Evaluate { params, surfaces } = self;
         let (eps, spacing) = (params.eps, params.spacing.to_array());
-        let (normal, [d, mean]) = (surface.normal.to_array().map(Scalar), distances.map(Scalar));
-        let [curvature, depth] = drag(d, normal, spacing, eps);
-        let mean_shear = drag(mean, normal, spacing, eps);
-        let driven = parabola(mean, normal, spacing, eps);
-        surface.forcing = FaceForcing {
-            strength: params.strength(d, curvature).0 / depth.0,
-            closed_fraction: 1.0 - pressure_weight_of(mean, eps, mean_shear, driven).0,
-            solid_fraction: 1.0 - aperture(d, eps).0,
-        };
-        surface.shear = ShearProfile { distance: d.0, depth: depth.0, curvature: curvature.0 };
-        let [curvature, depth] = mean_shear;
-        surface.mean_shear =
-            ShearProfile { distance: mean.0, depth: depth.0, curvature: curvature.0 };
-        (surface.integral_curvature, surface.integral) = (driven[0].0, driven[1].0);
+        for surfaces in surfaces.chunks_mut(V::WIDTH) {
+            let [mut distances, mut means, mut x, mut y, mut z] = [[0.0; MAX_LANES]; 5];
+            for (n, surface) in surfaces.iter().enumerate() {
+                [x[n], y[n], z[n]] = surface.normal.to_array();
+                distances[n] = surface.shear.distance;
+                means[n] = surface.mean_shear.distance;
+            }
+            let (d, mean) = (V::load(&distances), V::load(&means));
+            let normal = [V::load(&x), V::load(&y), V::load(&z)];
+            let [curvature, depth] = drag(d, normal, spacing, eps);
+            let mean_shear = drag(mean, normal, spacing, eps);
+            let driven = parabola(mean, normal, spacing, eps);
+            let vectors = [
+                params.strength(d, curvature).div(depth),
+                V::constant(1.0) - pressure_weight_of(mean, eps, mean_shear, driven),
+                V::constant(1.0) - aperture(d, eps),
+                curvature,
+                depth,
+                mean_shear[0],
+                mean_shear[1],
+                driven[0],
+                driven[1],
+            ];
+            let mut lanes = [[0.0; MAX_LANES]; 9];
+            for (vector, lanes) in vectors.iter().zip(&mut lanes) {
+                vector.store(lanes);
+            }
+            for (n, surface) in surfaces.iter_mut().enumerate() {
+                let forcing = &mut surface.forcing;
+                [forcing.strength, forcing.closed_fraction, forcing.solid_fraction] =
+                    [lanes[0][n], lanes[1][n], lanes[2][n]];
+                [surface.shear.curvature, surface.shear.depth] = [lanes[3][n], lanes[4][n]];
+                let mean_shear = &mut surface.mean_shear;
+                [mean_shear.curvature, mean_shear.depth] = [lanes[5][n], lanes[6][n]];
+                [surface.integral_curvature, surface.integral] = [lanes[7][n], lanes[8][n]];
+            }
+        }
     }
 }
 
@@ -225,12 +265,18 @@ mod tests {
     const H: f64 = 0.5;
     const EPS: f64 = 0.625;
 
+    /// A plane wall with the unit `normal` at the distance `d`, evaluated.
+    fn alone(params: &ForcingParams, d: f64, normal: DVec3) -> NearSurface {
+        let mut surface = NearSurface::new([d; 2], normal);
+        evaluate(params, std::slice::from_mut(&mut surface));
+        surface
+    }
+
     /// Forcing of a face by two parallel walls at the distances `d` and `width - d`: drag over
     /// viscosity by either, pressure weight.
     fn between_walls(d: f64, width: f64, normal: DVec3) -> ([f64; 2], f64) {
         let params = ForcingParams::new(Scheme::Aperture, EPS, DVec3::splat(H), 1.0, 1.0);
-        let one = NearSurface::new(&params, [d; 2], normal);
-        let other = NearSurface::new(&params, [width - d; 2], -normal);
+        let [one, other] = [alone(&params, d, normal), alone(&params, width - d, -normal)];
         let [(_, [first, all]), (_, [second, _])] =
             [[one, other], [other, one]].map(|mut both| share(&params, &mut both));
         ([first.strength, second.strength], 1.0 - all.closed_fraction)
@@ -267,9 +313,28 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_evaluated_together_are_bitwise_those_evaluated_alone() {
+        let params = ForcingParams::new(Scheme::Aperture, EPS, DVec3::splat(H), 1.0, 1.0);
+        // Distances from deep inside to beyond the reach; 37 surfaces leave a part of a register.
+        let mut together: Vec<_> = (0..37)
+            .map(|n| {
+                let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(n);
+                let d = EPS * (f64::from(n) / 9.0 - 1.2);
+                NearSurface::new([d, d + 0.1], (u.fract() - 0.5).normalize())
+            })
+            .collect();
+        let mut apart = together.clone();
+        evaluate(&params, &mut together);
+        apart.iter_mut().for_each(|one| evaluate(&params, std::slice::from_mut(one)));
+        assert_eq!(together, apart);
+        Evaluate { params: &params, surfaces: &mut apart }.run::<Scalar<f64>>();
+        assert_eq!(together, apart);
+    }
+
+    #[test]
     fn far_walls_and_walls_at_right_angles_add_up() {
         let params = ForcingParams::new(Scheme::Aperture, EPS, DVec3::splat(H), 1.0, 1.0);
-        let alone = |d: f64, normal| NearSurface::new(&params, [d; 2], normal);
+        let alone = |d, normal| alone(&params, d, normal);
         for (one, other) in [
             (alone(0.2, DVec3::X), alone(1.2, DVec3::NEG_X)),
             (alone(0.2, DVec3::X), alone(0.3, DVec3::Y)),

@@ -14,8 +14,10 @@ use glam::{DMat3, DVec3};
 
 use super::Locator;
 use super::aperture::forcing_reach;
-use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan};
-use super::narrow_band::{load_all, nearest_distance, store_all};
+use super::lists::{
+    BandFaces, FaceRow, FaceRun, LocatedBody, NearNeighbour, RowPart, RowSpan, SharedFace,
+};
+use super::narrow_band::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::FACE_OFFSET;
 use crate::math::Aligned;
@@ -33,6 +35,8 @@ pub struct LocateScratch {
     /// Mean distances of the candidates [m].
     mean_distances: Aligned<f32>,
     parts: Vec<RowPart>,
+    /// Neighbours near a row.
+    near_row: Vec<usize>,
 }
 
 /// Kernel that fills the lists of one grain.
@@ -165,7 +169,7 @@ impl FillLists<'_> {
         let h = self.locator.mesh.spacing;
         let start = corner + h * DVec3::new(0.0, f64::from(j), f64::from(k));
         let step = h.x * DVec3::X;
-        let LocateScratch { band, points, mean_distances, parts } = &mut *self.scratch;
+        let LocateScratch { band, points, mean_distances, parts, near_row } = &mut *self.scratch;
         parts.clear();
         (self.body.index_map).contiguous_parts(component, [j, k], span.start..span.end, parts);
         for part in &*parts {
@@ -189,7 +193,9 @@ impl FillLists<'_> {
             }
             if !self.locator.neighbours(self.index).is_empty() {
                 let distances = &mut distances[first..];
-                self.locator.assign(self.index, [start, step], [range, forced], distances, band);
+                let row = [start, step];
+                let lists = (&mut *band, &mut *near_row);
+                self.locator.assign(self.index, row, [range, forced], distances, lists);
             }
         }
     }
@@ -200,28 +206,45 @@ impl Locator {
     /// grain `index` of faces in `range` that are nearer to another grain to infinity. Of the
     /// `forced` faces, the last of `band`, those deep inside a nearer neighbour get a distance
     /// outside the band, and those in its band are recorded as shared. `start` is the position of
-    /// face 0 and `step` the vector from a face to the next [m].
+    /// face 0 and `step` the vector from a face to the next, along x [m].
     fn assign(
         &self,
         index: usize,
         [start, step]: [DVec3; 2],
         [range, forced]: [Range<i32>; 2],
         distances: &mut [f32],
-        band: &mut BandFaces,
+        (band, near_row): (&mut BandFaces, &mut Vec<usize>),
     ) {
         let first_forced = band.count() - forced.len();
+        let position = |i| start + f64::from(i) * step;
+        let ends = [position(range.start), position(range.end - 1)];
         let neighbours = self.neighbours(index);
+        let is_near = |n: &usize| neighbours[*n].is_near_row(ends, self.reach);
+        near_row.clear();
+        near_row.extend((0..neighbours.len()).filter(is_near));
         for (i, distance) in range.zip(distances) {
-            let x = start + f64::from(i) * step;
-            let d = f64::from(*distance);
-            let nearest = nearest_distance(neighbours, &self.shapes, x, self.reach);
-            if forced.contains(&i) {
-                let entry = first_forced + (i - forced.start) as usize;
-                if nearest <= -self.eps && nearest < d {
-                    band.set_outside(entry, self.eps);
-                } else if nearest < forcing_reach(self.eps) {
-                    band.shared.push((entry, x));
+            let (x, d) = (position(i), f64::from(*distance));
+            let mut nearest = f64::INFINITY;
+            let first_near = band.near.len();
+            for &neighbour in &*near_row {
+                let other = &neighbours[neighbour];
+                let (distance, gradient) = other.distance_and_gradient(&self.shapes, x, self.reach);
+                nearest = nearest.min(distance + other.tie_breaker);
+                if distance < forcing_reach(self.eps) {
+                    band.near.push(NearNeighbour { neighbour, distance, gradient });
                 }
+            }
+            let entry = forced.contains(&i).then(|| first_forced + (i - forced.start) as usize);
+            match entry {
+                Some(entry) if nearest <= -self.eps && nearest < d => {
+                    band.set_outside(entry, self.eps);
+                    band.near.truncate(first_near);
+                }
+                Some(entry) if nearest < forcing_reach(self.eps) => {
+                    let near = first_near..band.near.len();
+                    band.shared.push(SharedFace { entry, position: x, nearest, near });
+                }
+                _ => band.near.truncate(first_near),
             }
             if d > nearest {
                 *distance = f32::INFINITY;

@@ -97,8 +97,34 @@ pub struct BandFaces {
     pub mean_distance: Vec<f32>,
     /// Unit normals out of the grain, space frame, by axis.
     pub normal: [Vec<f32>; 3],
-    /// Faces in the bands of other grains as well: entry and position [m].
-    pub shared: Vec<(usize, DVec3)>,
+    /// Faces in the bands of other grains as well.
+    pub shared: Vec<SharedFace>,
+    /// Surfaces of these grains near the shared faces, in the order of the faces.
+    pub near: Vec<NearNeighbour>,
+}
+
+/// A face in the forcing band of one grain and in those of other grains.
+#[derive(Clone, Debug)]
+pub struct SharedFace {
+    /// Entry in [`BandFaces`].
+    pub entry: usize,
+    /// Position [m].
+    pub position: DVec3,
+    /// Distance to the nearest of the other grains, tie breaker included [m].
+    pub nearest: f64,
+    /// The other grains whose bands hold the face, in [`BandFaces::near`].
+    pub near: Range<usize>,
+}
+
+/// Surface of a neighbour near a face.
+#[derive(Clone, Copy, Debug)]
+pub struct NearNeighbour {
+    /// Entry in the list of the neighbours of the grain.
+    pub neighbour: usize,
+    /// Signed distance [m].
+    pub distance: f64,
+    /// Gradient of the distance, frame of the neighbour.
+    pub gradient: DVec3,
 }
 
 impl BandFaces {
@@ -110,6 +136,7 @@ impl BandFaces {
     pub(super) fn clear(&mut self) {
         self.count = 0;
         self.shared.clear();
+        self.near.clear();
     }
     /// Makes room for `count` more faces.
     pub(super) fn reserve(&mut self, count: usize) {

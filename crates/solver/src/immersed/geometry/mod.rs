@@ -13,8 +13,8 @@ mod samples;
 mod sampling;
 
 pub use distances::LocateScratch;
-pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD};
-pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all, nearest_distance};
+pub use lists::{BandFaces, FaceRow, FaceRun, LocatedBody, PAD, SharedFace};
+pub use narrow_band::{NarrowBandShapes, NeighbourGrain, load_all};
 pub use sampling::narrow_band_bytes;
 
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};

@@ -185,24 +185,20 @@ impl NeighbourGrain {
         shape.distance_and_gradient(self.pose.to_body(x))
     }
 
+    /// Returns whether points between `start` and `end`, on a line along x, may be within `limit`
+    /// [m] of the neighbour.
+    pub fn is_near_row(&self, [start, end]: [DVec3; 2], limit: f64) -> bool {
+        let centre = self.pose.position + self.shift;
+        let closest = DVec3::new(centre.x.max(start.x).min(end.x), start.y, start.z);
+        // Larger by more than rounding.
+        let far = (1.0 + 1e-9) * (self.bounding_radius + limit);
+        closest.distance_squared(centre) <= far * far
+    }
+
     /// Mean distance [m] from `x` to the surface of the neighbour, where the distance is `d` [m].
     pub fn mean_distance(&self, shapes: &NarrowBandShapes, x: DVec3, d: f64) -> f64 {
         shapes.of(self.grain).mean_distance(self.pose.to_body(x - self.shift), d)
     }
-}
-
-/// Smallest distance from `x` to a neighbour, tie breaker included [m]; infinite beyond `limit`
-/// [m].
-pub fn nearest_distance(
-    neighbours: &[NeighbourGrain],
-    shapes: &NarrowBandShapes,
-    x: DVec3,
-    limit: f64,
-) -> f64 {
-    let distances = neighbours
-        .iter()
-        .map(|other| other.distance_and_gradient(shapes, x, limit).0 + other.tie_breaker);
-    distances.fold(f64::INFINITY, f64::min)
 }
 
 /// Loads a vector from each list. Kernels use no closures on vectors, which would not be inlined.
