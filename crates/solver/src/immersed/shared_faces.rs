@@ -36,9 +36,6 @@ use grainwake_simd::{Kernel, MAX_LANES, Scalar, Vector, dispatch};
 /// Least m(d_i) - m(-d_j) in a gap, over m(d_i): the shear of grains in contact remains finite.
 const LEAST_DEPTH: f64 = 0.1;
 
-/// Faces of which the surfaces are evaluated together: these fit a first-level cache.
-const FACES_AT_A_TIME: usize = 64;
-
 /// Divides the forcing of the faces that `neighbours` force too among the grains. `forced` has the
 /// weights without neighbours.
 pub fn share_faces(
@@ -54,33 +51,29 @@ pub fn share_faces(
     }
     forced.total_closed_fraction.extend_from_slice(&forced.closed_fraction);
     // A face deep inside a grain takes the velocity of this grain alone.
-    let is_deep = |face: &&SharedFace| {
-        params.scheme == Scheme::Aperture && f64::from(band.distance[face.entry]) <= -params.eps
-    };
-    let mut surfaces = Vec::new();
-    for faces in band.shared.chunks(FACES_AT_A_TIME) {
-        let faces = || faces.iter().filter(|face| !is_deep(face));
-        surfaces.clear();
-        for face in faces() {
-            let (distances, normal) = band.face(face.entry);
-            surfaces.push(NearSurface::new(distances, normal));
-            surfaces.extend(band.near[face.near.clone()].iter().map(|near| {
-                let other = &neighbours[near.neighbour];
-                let normal = other.pose.orientation * near.gradient.normalize_or_zero();
-                let mean = other.mean_distance(shapes, face.position, near.distance);
-                NearSurface::new([near.distance, mean], normal)
-            }));
+    let is_deep = |entry: usize| f64::from(band.distance[entry]) <= -params.eps;
+    let is_shared = |face: &&SharedFace| params.scheme == Scheme::Paper || !is_deep(face.entry);
+    let faces = || band.shared.iter().filter(is_shared);
+    let mut surfaces = Vec::with_capacity(band.shared.len() + band.near.len());
+    for face in faces() {
+        let (distances, normal) = band.face(face.entry);
+        surfaces.push(NearSurface { distances, normal, ..NearSurface::default() });
+        for &(neighbour, d, gradient) in &band.near[face.near.clone()] {
+            let other = &neighbours[neighbour];
+            let normal = other.pose.orientation * gradient.normalize_or_zero();
+            let distances = [d, other.mean_distance(shapes, face.position, d)];
+            surfaces.push(NearSurface { distances, normal, ..NearSurface::default() });
         }
-        evaluate(params, &mut surfaces);
-        let mut rest = &mut surfaces[..];
-        for face in faces() {
-            let near = rest.split_off_mut(..1 + face.near.len()).expect("each has its surfaces");
-            let (weight, [own, all]) = share(params, near);
-            forced.weight[face.entry] = weight as f32;
-            forced.closed_fraction[face.entry] = own.closed_fraction as f32;
-            forced.solid_fraction[face.entry] = own.solid_fraction as f32;
-            forced.total_closed_fraction[face.entry] = all.closed_fraction as f32;
-        }
+    }
+    evaluate(params, &mut surfaces);
+    let mut rest = &mut surfaces[..];
+    for face in faces() {
+        let near = rest.split_off_mut(..1 + face.near.len()).expect("each has its surfaces");
+        let (weight, [own, all]) = share(params, near);
+        forced.weight[face.entry] = weight as f32;
+        forced.closed_fraction[face.entry] = own.closed_fraction as f32;
+        forced.solid_fraction[face.entry] = own.solid_fraction as f32;
+        forced.total_closed_fraction[face.entry] = all.closed_fraction as f32;
     }
 }
 
@@ -91,18 +84,18 @@ fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceFor
     // The paper's scheme knows no gaps.
     let in_gaps = if params.scheme == Scheme::Aperture { surfaces.len() } else { 0 };
     for i in 0..in_gaps {
-        let mut depth = surfaces[i].shear.depth;
+        let mut depth = surfaces[i].shear[1];
         for j in (0..in_gaps).filter(|&j| j != i) {
             let opposed = (-surfaces[i].normal.dot(surfaces[j].normal)).max(0.0);
-            depth -= opposed * surfaces[j].shear.depth_behind();
+            depth -= opposed * (surfaces[j].shear[1] - surfaces[j].distances[0]);
             if i < j {
                 open += opposed * opening(&surfaces[i], &surfaces[j], params.eps);
             }
         }
         let one = &mut surfaces[i];
         if one.forcing.strength > 0.0 {
-            let depth = depth.max(LEAST_DEPTH * one.shear.depth);
-            one.forcing.strength = params.diffusion * one.shear.curvature / depth;
+            let depth = depth.max(LEAST_DEPTH * one.shear[1]);
+            one.forcing.strength = params.diffusion * one.shear[0] / depth;
         }
     }
     let sum = |part: fn(&FaceForcing) -> f64| -> f64 {
@@ -129,70 +122,37 @@ fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceFor
 /// Pressure weight of a face in the gap between two parallel walls, less the weight 1 - c_1 - c_2
 /// that the sum over single walls would give.
 fn opening(one: &NearSurface, other: &NearSurface, eps: f64) -> f64 {
-    let [a, b] = [&one.mean_shear, &other.mean_shear];
-    let width = a.distance + b.distance;
-    let depths = [a.depth - b.depth_behind(), b.depth - a.depth_behind()];
+    let ([_, d_1], [_, d_2]) = (one.distances, other.distances);
+    let ([lm_1, m_1], [lm_2, m_2]) = (one.mean_shear, other.mean_shear);
+    let width = d_1 + d_2;
+    let depths = [m_1 - (m_2 - d_2), m_2 - (m_1 - d_1)];
     if width <= 0.0 || depths.iter().any(|depth| *depth < 1e-9 * eps) {
         return 0.0;
     }
-    let drag = a.curvature / depths[0] + b.curvature / depths[1];
+    let drag = lm_1 / depths[0] + lm_2 / depths[1];
     let centre = open_depth_integral(Scalar(0.0), eps).0;
-    let parabola = 0.5 * width * (a.depth + b.depth)
-        - one.integral
-        - other.integral
-        - 0.5 * a.distance * b.distance
+    let parabola = 0.5 * width * (m_1 + m_2) - one.driven[1] - other.driven[1] - 0.5 * d_1 * d_2
         + 2.0 * centre;
-    let curvature = 0.5 * width * (a.curvature + b.curvature)
-        - one.integral_curvature
-        - other.integral_curvature
-        + 1.0;
+    let curvature = 0.5 * width * (lm_1 + lm_2) - one.driven[0] - other.driven[0] + 1.0;
     let weight = (drag * parabola - curvature).clamp(0.0, 1.0);
     weight - (1.0 - one.forcing.closed_fraction - other.forcing.closed_fraction)
 }
 
-/// Profile of a shear over one wall at a face.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct ShearProfile {
-    /// Distance d from the wall [m].
-    distance: f64,
-    /// Open depth m(d) [m].
-    depth: f64,
-    /// L m(d) [1/m].
-    curvature: f64,
-}
-
-impl ShearProfile {
-    /// Open depth m(-d) on the other side of the wall [m]; m(d) - m(-d) = d.
-    fn depth_behind(&self) -> f64 {
-        self.depth - self.distance
-    }
-}
-
-/// A surface near a face.
+/// A surface near a face. [`evaluate`] fills all but the first two fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct NearSurface {
     /// Unit normal, out of the grain.
     normal: DVec3,
+    /// Distance d and mean distance [m].
+    distances: [f64; 2],
     /// Forcing as if no other surface were near.
     forcing: FaceForcing,
-    /// Shear at the distance of the face, for the drag.
-    shear: ShearProfile,
-    /// Shear at the mean distance, for the pressure weight.
-    mean_shear: ShearProfile,
-    /// M at the mean distance [m^2].
-    integral: f64,
-    /// L M at the mean distance.
-    integral_curvature: f64,
-}
-
-impl NearSurface {
-    /// Surface with the unit `normal` at a distance and a mean distance [m] from a face, before
-    /// [`evaluate`].
-    fn new([distance, mean_distance]: [f64; 2], normal: DVec3) -> NearSurface {
-        let at = |distance| ShearProfile { distance, ..ShearProfile::default() };
-        let [shear, mean_shear] = [at(distance), at(mean_distance)];
-        NearSurface { normal, shear, mean_shear, ..NearSurface::default() }
-    }
+    /// L m [1/m] and m [m] at the distance, for the drag; m(-d) = m(d) - d.
+    shear: [f64; 2],
+    /// L m and m at the mean distance, for the pressure weight.
+    mean_shear: [f64; 2],
+    /// L M and M [m^2] at the mean distance.
+    driven: [f64; 2],
 }
 
 /// Evaluates each of the `surfaces` alone.
@@ -200,7 +160,7 @@ fn evaluate(params: &ForcingParams, surfaces: &mut [NearSurface]) {
     match params.scheme {
         Scheme::Aperture => dispatch(Evaluate { params, surfaces }),
         Scheme::Paper => surfaces.iter_mut().for_each(|surface| {
-            surface.forcing = params.blend(surface.shear.distance, surface.normal);
+            surface.forcing = params.blend(surface.distances[0], surface.normal);
         }),
     }
 }
@@ -221,37 +181,26 @@ impl Kernel for Evaluate<'_> {
             let [mut distances, mut means, mut x, mut y, mut z] = [[0.0; MAX_LANES]; 5];
             for (n, surface) in surfaces.iter().enumerate() {
                 [x[n], y[n], z[n]] = surface.normal.to_array();
-                distances[n] = surface.shear.distance;
-                means[n] = surface.mean_shear.distance;
+                [distances[n], means[n]] = surface.distances;
             }
             let (d, mean) = (V::load(&distances), V::load(&means));
             let normal = [V::load(&x), V::load(&y), V::load(&z)];
-            let [curvature, depth] = drag(d, normal, spacing, eps);
+            let [a, b] = drag(d, normal, spacing, eps);
             let mean_shear = drag(mean, normal, spacing, eps);
             let driven = parabola(mean, normal, spacing, eps);
-            let vectors = [
-                params.strength(d, curvature).div(depth),
-                V::constant(1.0) - pressure_weight_of(mean, eps, mean_shear, driven),
-                V::constant(1.0) - aperture(d, eps),
-                curvature,
-                depth,
-                mean_shear[0],
-                mean_shear[1],
-                driven[0],
-                driven[1],
-            ];
+            let strength = params.strength(d, a).div(b);
+            let closed = V::constant(1.0) - pressure_weight_of(mean, eps, mean_shear, driven);
+            let solid = V::constant(1.0) - aperture(d, eps);
+            let ([c, d], [e, f]) = (mean_shear, driven);
             let mut lanes = [[0.0; MAX_LANES]; 9];
-            for (vector, lanes) in vectors.iter().zip(&mut lanes) {
-                vector.store(lanes);
+            for (vector, to) in [strength, closed, solid, a, b, c, d, e, f].iter().zip(&mut lanes) {
+                vector.store(to);
             }
             for (n, surface) in surfaces.iter_mut().enumerate() {
-                let forcing = &mut surface.forcing;
-                [forcing.strength, forcing.closed_fraction, forcing.solid_fraction] =
-                    [lanes[0][n], lanes[1][n], lanes[2][n]];
-                [surface.shear.curvature, surface.shear.depth] = [lanes[3][n], lanes[4][n]];
-                let mean_shear = &mut surface.mean_shear;
-                [mean_shear.curvature, mean_shear.depth] = [lanes[5][n], lanes[6][n]];
-                [surface.integral_curvature, surface.integral] = [lanes[7][n], lanes[8][n]];
+                let [strength, closed_fraction, solid_fraction, a, b, c, d, e, f] =
+                    lanes.each_ref().map(|lanes| lanes[n]);
+                surface.forcing = FaceForcing { strength, closed_fraction, solid_fraction };
+                (surface.shear, surface.mean_shear, surface.driven) = ([a, b], [c, d], [e, f]);
             }
         }
     }
@@ -267,7 +216,7 @@ mod tests {
 
     /// A plane wall with the unit `normal` at the distance `d`, evaluated.
     fn alone(params: &ForcingParams, d: f64, normal: DVec3) -> NearSurface {
-        let mut surface = NearSurface::new([d; 2], normal);
+        let mut surface = NearSurface { distances: [d; 2], normal, ..NearSurface::default() };
         evaluate(params, std::slice::from_mut(&mut surface));
         surface
     }
@@ -320,7 +269,8 @@ mod tests {
             .map(|n| {
                 let u = DVec3::new(0.8191725134, 0.6710436067, 0.5497004779) * f64::from(n);
                 let d = EPS * (f64::from(n) / 9.0 - 1.2);
-                NearSurface::new([d, d + 0.1], (u.fract() - 0.5).normalize())
+                let (distances, normal) = ([d, d + 0.1], (u.fract() - 0.5).normalize());
+                NearSurface { distances, normal, ..NearSurface::default() }
             })
             .collect();
         let mut apart = together.clone();

@@ -14,9 +14,7 @@ use glam::{DMat3, DVec3};
 
 use super::Locator;
 use super::aperture::forcing_reach;
-use super::lists::{
-    BandFaces, FaceRow, FaceRun, LocatedBody, NearNeighbour, RowPart, RowSpan, SharedFace,
-};
+use super::lists::{BandFaces, FaceRow, FaceRun, LocatedBody, RowPart, RowSpan, SharedFace};
 use super::narrow_band::{load_all, store_all};
 use crate::dem::Grain;
 use crate::grid::FACE_OFFSET;
@@ -231,7 +229,7 @@ impl Locator {
                 let (distance, gradient) = other.distance_and_gradient(&self.shapes, x, self.reach);
                 nearest = nearest.min(distance + other.tie_breaker);
                 if distance < forcing_reach(self.eps) {
-                    band.near.push(NearNeighbour { neighbour, distance, gradient });
+                    band.near.push((neighbour, distance, gradient));
                 }
             }
             let entry = forced.contains(&i).then(|| first_forced + (i - forced.start) as usize);

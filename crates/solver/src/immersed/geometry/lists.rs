@@ -99,8 +99,9 @@ pub struct BandFaces {
     pub normal: [Vec<f32>; 3],
     /// Faces in the bands of other grains as well.
     pub shared: Vec<SharedFace>,
-    /// Surfaces of these grains near the shared faces, in the order of the faces.
-    pub near: Vec<NearNeighbour>,
+    /// Surfaces of these grains near the shared faces: entry in the list of the neighbours of the
+    /// grain, signed distance [m], and its gradient in the frame of the neighbour.
+    pub near: Vec<(usize, f64, DVec3)>,
 }
 
 /// A face in the forcing band of one grain and in those of other grains.
@@ -114,17 +115,6 @@ pub struct SharedFace {
     pub nearest: f64,
     /// The other grains whose bands hold the face, in [`BandFaces::near`].
     pub near: Range<usize>,
-}
-
-/// Surface of a neighbour near a face.
-#[derive(Clone, Copy, Debug)]
-pub struct NearNeighbour {
-    /// Entry in the list of the neighbours of the grain.
-    pub neighbour: usize,
-    /// Signed distance [m].
-    pub distance: f64,
-    /// Gradient of the distance, frame of the neighbour.
-    pub gradient: DVec3,
 }
 
 impl BandFaces {
