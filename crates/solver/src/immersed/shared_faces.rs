@@ -81,21 +81,21 @@ pub fn share_faces(
 /// forcing of all together. The closed and the solid fraction of all are at most one.
 fn share(params: &ForcingParams, surfaces: &mut [NearSurface]) -> (f64, [FaceForcing; 2]) {
     let mut open = 0.0;
-    // The paper's scheme knows no gaps.
-    let in_gaps = if params.scheme == Scheme::Aperture { surfaces.len() } else { 0 };
-    for i in 0..in_gaps {
-        let mut depth = surfaces[i].shear[1];
-        for j in (0..in_gaps).filter(|&j| j != i) {
+    // The paper's scheme has no correction for gaps.
+    let count = if params.scheme == Scheme::Aperture { surfaces.len() } else { 0 };
+    for i in 0..count {
+        let [curvature, full_depth] = surfaces[i].shear;
+        let mut depth = full_depth;
+        for j in (0..count).filter(|&j| j != i) {
             let opposed = (-surfaces[i].normal.dot(surfaces[j].normal)).max(0.0);
-            depth -= opposed * (surfaces[j].shear[1] - surfaces[j].distances[0]);
+            depth -= opposed * surfaces[j].depth_behind();
             if i < j {
                 open += opposed * opening(&surfaces[i], &surfaces[j], params.eps);
             }
         }
-        let one = &mut surfaces[i];
-        if one.forcing.strength > 0.0 {
-            let depth = depth.max(LEAST_DEPTH * one.shear[1]);
-            one.forcing.strength = params.diffusion * one.shear[0] / depth;
+        let forcing = &mut surfaces[i].forcing;
+        if forcing.strength > 0.0 {
+            forcing.strength = params.diffusion * curvature / depth.max(LEAST_DEPTH * full_depth);
         }
     }
     let sum = |part: fn(&FaceForcing) -> f64| -> f64 {
@@ -155,6 +155,13 @@ struct NearSurface {
     driven: [f64; 2],
 }
 
+impl NearSurface {
+    /// Open depth m(-d) on the other side of the wall [m].
+    fn depth_behind(&self) -> f64 {
+        self.shear[1] - self.distances[0]
+    }
+}
+
 /// Evaluates each of the `surfaces` alone.
 fn evaluate(params: &ForcingParams, surfaces: &mut [NearSurface]) {
     match params.scheme {
@@ -185,25 +192,31 @@ impl Kernel for Evaluate<'_> {
             }
             let (d, mean) = (V::load(&distances), V::load(&means));
             let normal = [V::load(&x), V::load(&y), V::load(&z)];
-            let [a, b] = drag(d, normal, spacing, eps);
+            let shear = drag(d, normal, spacing, eps);
             let mean_shear = drag(mean, normal, spacing, eps);
             let driven = parabola(mean, normal, spacing, eps);
-            let strength = params.strength(d, a).div(b);
+            let strength = params.strength(d, shear[0]).div(shear[1]);
             let closed = V::constant(1.0) - pressure_weight_of(mean, eps, mean_shear, driven);
             let solid = V::constant(1.0) - aperture(d, eps);
-            let ([c, d], [e, f]) = (mean_shear, driven);
-            let mut lanes = [[0.0; MAX_LANES]; 9];
-            for (vector, to) in [strength, closed, solid, a, b, c, d, e, f].iter().zip(&mut lanes) {
-                vector.store(to);
-            }
+            let (forcing, shear) = (lanes_of([strength, closed, solid]), lanes_of(shear));
+            let (mean_shear, driven) = (lanes_of(mean_shear), lanes_of(driven));
             for (n, surface) in surfaces.iter_mut().enumerate() {
-                let [strength, closed_fraction, solid_fraction, a, b, c, d, e, f] =
-                    lanes.each_ref().map(|lanes| lanes[n]);
+                let [strength, closed_fraction, solid_fraction] = forcing.map(|lanes| lanes[n]);
                 surface.forcing = FaceForcing { strength, closed_fraction, solid_fraction };
-                (surface.shear, surface.mean_shear, surface.driven) = ([a, b], [c, d], [e, f]);
+                surface.shear = shear.map(|lanes| lanes[n]);
+                surface.mean_shear = mean_shear.map(|lanes| lanes[n]);
+                surface.driven = driven.map(|lanes| lanes[n]);
             }
         }
     }
+}
+
+/// Lanes of each vector.
+#[inline(always)]
+fn lanes_of<V: Vector, const N: usize>(vectors: [V; N]) -> [[V::Number; MAX_LANES]; N] {
+    let mut lanes = [[V::Number::default(); MAX_LANES]; N];
+    vectors.iter().zip(&mut lanes).for_each(|(vector, lanes)| vector.store(lanes));
+    lanes
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Warnings about resolution and cost.
 
-use crate::case::estimate::{Estimate, THIN_LAYER_DRAG_ERROR, drag_error_text};
+use crate::case::estimate::{
+    Estimate, cells_for_drag_error, drag_error_text, thin_layer_drag_error,
+};
 use crate::case::settling::{is_free, prescribed_speeds, time_step};
 use crate::case::time_scale::resolved_step;
 use crate::number_format::{AXES, quantity};
@@ -40,13 +42,13 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; {finer}"));
     }
     if let (Some(n), Some(re)) = (e.cells_per_diameter, e.largest_reynolds()) {
-        let error = THIN_LAYER_DRAG_ERROR * re / (n * n);
+        let error = thin_layer_drag_error(n, re);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {:.0} cells reduce the error to 3 %: {finer}",
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {} cells reduce the error to 3 %: {finer}",
                 n / re.sqrt(),
                 drag_error_text(error, 0),
-                (THIN_LAYER_DRAG_ERROR * re / 0.03).sqrt().ceil()
+                cells_for_drag_error(0.03, re)
             ));
         }
     }

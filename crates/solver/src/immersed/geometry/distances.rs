@@ -191,9 +191,8 @@ impl FillLists<'_> {
             }
             if !self.locator.neighbours(self.index).is_empty() {
                 let distances = &mut distances[first..];
-                let row = [start, step];
                 let lists = (&mut *band, &mut *near_row);
-                self.locator.assign(self.index, row, [range, forced], distances, lists);
+                self.locator.assign(self.index, [start, step], [range, forced], distances, lists);
             }
         }
     }
@@ -226,10 +225,10 @@ impl Locator {
             let first_near = band.near.len();
             for &neighbour in &*near_row {
                 let other = &neighbours[neighbour];
-                let (distance, gradient) = other.distance_and_gradient(&self.shapes, x, self.reach);
-                nearest = nearest.min(distance + other.tie_breaker);
-                if distance < forcing_reach(self.eps) {
-                    band.near.push((neighbour, distance, gradient));
+                let (to_other, gradient) = other.distance_and_gradient(&self.shapes, x, self.reach);
+                nearest = nearest.min(to_other + other.tie_breaker);
+                if to_other < forcing_reach(self.eps) {
+                    band.near.push((neighbour, to_other, gradient));
                 }
             }
             let entry = forced.contains(&i).then(|| first_forced + (i - forced.start) as usize);
