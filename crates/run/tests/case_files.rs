@@ -736,10 +736,17 @@ fn packings_become_grains() {
     let d: Vec<f64> = case.setup.grains.iter().map(|g| g.shape.equivalent_diameter()).collect();
     assert!(d.iter().all(|d| (2e-3..4e-3).contains(d)) && d[0] != d[1]);
     let crowded = problems(&text.replace("count = 60", "count = 60000"));
-    assert!(crowded[0].message.contains("of 60000 grains find a place"), "{}", crowded[0]);
+    assert!(crowded[0].message.contains("sites for 60000 grains"), "{}", crowded[0]);
     assert_eq!(crowded.len(), 1, "{crowded:?}");
-    let random = good(&text.replace("seed = 3", "seed = 3\narrangement = \"random\""));
-    assert_eq!(random.setup.grains.len(), 60);
+    let random = text.replace("seed = 3", "seed = 3\narrangement = \"random\"");
+    assert_eq!(good(&random).setup.grains.len(), 60);
+    // 36 % of the region: closer than separate spheres would find random places.
+    let small = random.replace("\"190 mm\"", "\"20 mm\"");
+    let close = good(&small.replace("count = 60", "count = 230"));
+    assert_eq!(close.setup.grains.len(), 230);
+    let crowded = problems(&random.replace("count = 60", "count = 60000"));
+    assert!(crowded[0].message.contains("% of the volume of the region"), "{}", crowded[0]);
+    assert_eq!(crowded[0].key.as_deref(), Some("packing.0.region"));
 }
 
 #[test]

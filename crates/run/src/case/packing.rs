@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use rand::RngExt;
 use std::f64::consts::TAU;
 
-use grainwake_solver::dem::Enclosure;
+use grainwake_solver::dem::{Enclosure, Grain};
 
 /// Generator of a packing: the reference sequence of SplitMix64 (Steele, Lea and Flood 2014), on
 /// which the packings of published cases depend.
@@ -35,23 +35,34 @@ pub(super) struct Sphere {
     pub radius: f64,
 }
 
-/// Part of the box to fill, and the spheres in it.
-pub(super) struct Region<'a> {
+impl Sphere {
+    fn around(grain: &Grain) -> Sphere {
+        Sphere { centre: grain.pose.position, radius: grain.shape.bounding_radius() }
+    }
+}
+
+/// Part of the box to fill, and the grains in it.
+pub(super) struct Region {
     /// Lower corner [m].
     pub lower: DVec3,
     /// Upper corner [m].
     pub upper: DVec3,
-    /// Smallest distance between spheres, and from them to the walls [m].
+    /// Smallest distance between grains, and from them to the faces of the region [m].
     pub clearance: f64,
     /// Box with its periodic axes.
-    pub enclosure: &'a Enclosure,
-    /// Spheres of the grains that are placed already.
-    pub taken: &'a [Sphere],
+    pub enclosure: Enclosure,
+    /// Grains that are placed already.
+    pub placed: Vec<Grain>,
 }
 
-impl Region<'_> {
-    fn free(&self, sphere: Sphere, placed: &[Sphere]) -> bool {
-        self.taken.iter().chain(placed).all(|other| {
+impl Region {
+    /// Returns the volume of the region [m^3].
+    pub fn volume(&self) -> f64 {
+        (self.upper - self.lower).element_product()
+    }
+
+    fn free(&self, sphere: Sphere, others: &[Sphere]) -> bool {
+        self.placed.iter().map(Sphere::around).chain(others.iter().copied()).all(|other| {
             let mut arm = sphere.centre - other.centre;
             for axis in 0..3 {
                 if self.enclosure.periodic[axis] {
@@ -67,33 +78,32 @@ impl Region<'_> {
     /// Returns the distance of a sphere's centre from the faces of the region along each axis [m];
     /// zero where the region spans a periodic axis.
     fn margin(&self, radius: f64) -> DVec3 {
-        let spans = |axis: usize| {
-            self.enclosure.periodic[axis]
-                && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
-        };
-        DVec3::from_array([0, 1, 2].map(
-            |axis| {
-                if spans(axis) { 0.0 } else { radius + self.clearance }
-            },
-        ))
+        let along = |axis| if self.spans_period(axis) { 0.0 } else { radius + self.clearance };
+        DVec3::from_array([0, 1, 2].map(along))
     }
 
-    /// Returns random centres without overlap [m]; the error is the number of spheres placed.
-    pub fn random(&self, radii: &[f64], random: &mut Random) -> Result<Vec<DVec3>, usize> {
+    /// Returns whether the region spans the box along a periodic axis.
+    pub fn spans_period(&self, axis: usize) -> bool {
+        self.enclosure.periodic[axis]
+            && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
+    }
+
+    /// Returns random centres without overlap of the spheres [m]; none if a sphere finds no place.
+    pub fn random(&self, radii: &[f64], random: &mut Random) -> Option<Vec<DVec3>> {
         let mut placed: Vec<Sphere> = Vec::new();
         for &radius in radii {
             let margin = self.margin(radius);
             let room = self.upper - self.lower - 2.0 * margin;
             if room.min_element() < 0.0 {
-                return Err(placed.len());
+                return None;
             }
             let found = (0..20_000).find_map(|_| {
                 let sphere = Sphere { centre: self.lower + margin + room * point(random), radius };
                 self.free(sphere, &placed).then_some(sphere)
             });
-            placed.push(found.ok_or(placed.len())?);
+            placed.push(found?);
         }
-        Ok(placed.iter().map(|sphere| sphere.centre).collect())
+        Some(placed.iter().map(|sphere| sphere.centre).collect())
     }
 
     /// Returns centres on a cubic lattice [m], filled layer by layer along `up`. Each centre is
@@ -168,16 +178,17 @@ impl Region<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use grainwake_shape::Shape;
     use grainwake_solver::dem::Side;
     use rand::SeedableRng;
 
-    fn space<'a>(enclosure: &'a Enclosure, taken: &'a [Sphere]) -> Region<'a> {
+    fn space(enclosure: Enclosure, placed: Vec<Grain>) -> Region {
         Region {
             lower: DVec3::ZERO,
             upper: DVec3::new(1.0, 1.0, 3.0),
             clearance: 0.01,
             enclosure,
-            taken,
+            placed,
         }
     }
 
@@ -202,7 +213,7 @@ mod tests {
     fn lattices_keep_clear_and_inside() {
         for periodic in [false, true] {
             let enclosure = Enclosure { periodic: [periodic; 3], ..closed() };
-            let space = space(&enclosure, &[]);
+            let space = space(enclosure, Vec::new());
             let radii: Vec<f64> = (0..150).map(|i| 0.06 + 0.0002 * f64::from(i)).collect();
             for jitter in [0.0, 0.5, 1.0] {
                 let centres =
@@ -221,8 +232,9 @@ mod tests {
 
     #[test]
     fn random_places_are_clear_and_repeat() {
-        let (enclosure, taken) = (closed(), [Sphere { centre: DVec3::splat(0.5), radius: 0.3 }]);
-        let space = space(&enclosure, &taken);
+        let ball = Grain::new(Shape::sphere(0.3, 0), 1.0).with_position(DVec3::splat(0.5));
+        let (enclosure, placed) = (closed(), vec![ball]);
+        let space = space(enclosure, placed);
         let radii = [0.1; 60];
         let centres = space.random(&radii, &mut Random::seed_from_u64(3)).unwrap();
         assert!(space.clear(&spheres(&centres, &radii)));
@@ -231,12 +243,11 @@ mod tests {
     }
 
     #[test]
-    fn too_many_are_refused_with_the_capacity() {
+    fn too_many_are_refused() {
         let enclosure = closed();
-        let space = space(&enclosure, &[]);
+        let space = space(enclosure, Vec::new());
         assert_eq!(space.lattice(&[0.4; 9], 0.0, (2, 1.0), &mut Random::seed_from_u64(0)), Err(3));
-        let placed = space.random(&[0.4; 9], &mut Random::seed_from_u64(0)).unwrap_err();
-        assert!((1..4).contains(&placed));
+        assert_eq!(space.random(&[0.4; 9], &mut Random::seed_from_u64(0)), None);
     }
 
     #[test]

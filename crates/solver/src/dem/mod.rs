@@ -25,4 +25,4 @@ pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };
 pub(crate) use search::{BoundingSphere, BroadPhase, is_sphere};
-pub use search::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
+pub use search::{Gap, Outside, Overlap, gaps, initial_overlaps, outside, surface_gap, wall_gap};

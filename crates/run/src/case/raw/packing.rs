@@ -36,7 +36,7 @@ pub struct RawPacking {
     /// Lattice only: random shift as a fraction (0 to 1) of the free space around a lattice site.
     #[serde(default = "half")]
     pub jitter: Located<Quantity<Number>>,
-    /// Smallest distance between bounding spheres, and from them to the walls [m].
+    /// Smallest distance between grains, and from them to the faces of the region [m].
     #[serde(default)]
     pub clearance: Located<Quantity<Length>>,
     /// `random` or `aligned` (principal axes along x, y, z).
@@ -74,7 +74,7 @@ pub enum Arrangement {
     /// A cubic lattice, filled from below, each site shifted at random.
     #[default]
     Lattice,
-    /// Random positions without overlap.
+    /// Random positions without overlap of the bounding spheres; if they do not fit, of the surfaces.
     Random,
 }
 

@@ -134,6 +134,9 @@ fn solid_point(grain: &Grain) -> DVec3 {
 fn nested(grains: [&Grain; 2], solid: [DVec3; 2], enclosure: &Enclosure) -> Option<f64> {
     let [a, b] = grains;
     let line = enclosure.nearest_image(b.pose.position - a.pose.position);
+    if line.length() >= a.shape.bounding_radius() + b.shape.bounding_radius() {
+        return None;
+    }
     let depth_at = |grain: &Grain, x: DVec3| {
         let inside = x.length() < grain.shape.bounding_radius();
         let depth = -grain.shape.distance(grain.pose.orientation.conjugate() * x);

@@ -1,9 +1,10 @@
 //! `[[packing]]` -> raw grains.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::check::{Checker, point_into_box};
 use super::grains::{Grains, not_too_light, shape};
+use crate::case::close_packing::close_places;
 use crate::case::located::Located;
 use crate::case::packing::{Random, Region, Sphere, orientation};
 use crate::case::quantity::Quantity;
@@ -11,7 +12,7 @@ use crate::case::raw::{
     Arrangement, Bounds, MotionLaw, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
 use crate::number_format::vector;
-use grainwake_solver::dem::Enclosure;
+use grainwake_solver::dem::{Enclosure, Grain};
 use rand::{RngExt, SeedableRng};
 
 /// Largest number of grains of a packing.
@@ -43,7 +44,7 @@ pub(super) fn packing(
         not_too_light(check, &raw.density, fluid_density);
     }
     let mut random = Random::seed_from_u64(raw.seed);
-    let (mut packed, radii) = members(check, grains, raw, &mut random)?;
+    let (mut written, bodies) = members(check, grains, raw, &mut random)?;
 
     let (from, to) = (raw.region.as_ref())
         .map_or((enclosure.lower, enclosure.upper), |r| (r.lower.si, r.upper.si));
@@ -55,44 +56,75 @@ pub(super) fn packing(
         let message = "the region is empty or reaches out of the box";
         return check.refuse(region_span, message, format!("the box goes from {from} to {to}"));
     };
-    let sphere = |centre, radius| Sphere { centre, radius };
-    let taken: Vec<Sphere> = (grains.built.iter().flatten())
-        .map(|grain| sphere(grain.pose.position, grain.shape.bounding_radius()))
-        .collect();
-    let region = Region { lower, upper, clearance, enclosure, taken: &taken };
+    let placed: Vec<Grain> = grains.built.iter().flatten().cloned().collect();
+    let region = Region { lower, upper, clearance, enclosure: *enclosure, placed };
     let vertical = (grains.vertical.axis, grains.vertical.sign);
     let centres = match raw.arrangement {
-        Arrangement::Lattice => region.lattice(&radii, jitter, vertical, &mut random),
-        Arrangement::Random => region.random(&radii, &mut random),
+        Arrangement::Lattice => lattice(&region, &bodies, jitter, vertical, &mut random),
+        Arrangement::Random => random_places(&region, &bodies, &mut random),
     };
-    let refused = |capacity| {
-        let by_count = check.is_overridden(&raw.count.span);
-        let span = if by_count { &raw.count.span } else { region_span };
-        let message = format!("only {capacity} of {count} grains find a place without touching");
-        let help = "take fewer or smaller grains, a larger region, or less clearance; a lattice holds more than random places";
-        check.fail(span, message, help);
-    };
+    let by_count = check.is_overridden(&raw.count.span);
+    let span = if by_count { &raw.count.span } else { region_span };
+    let refused = |(message, help): (String, &str)| check.fail(span, message, help);
     let centres = centres.map_err(refused).ok()?;
-    let pairs = centres.iter().zip(&radii);
-    let spheres: Vec<Sphere> = pairs.map(|(centre, radius)| sphere(*centre, *radius)).collect();
+    for (grain, centre) in written.iter_mut().zip(centres) {
+        grain.position = Some(Position(centre.to_array().to_vec()).into());
+    }
+    Some(written)
+}
+
+/// Returns centres on a lattice [m]; the error is a message and the help.
+fn lattice(
+    region: &Region,
+    grains: &[Grain],
+    jitter: f64,
+    vertical: (usize, f64),
+    random: &mut Random,
+) -> Result<Vec<DVec3>, (String, &'static str)> {
+    let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
+    let centres = region.lattice(&radii, jitter, vertical, random).map_err(|sites| {
+        let message = format!("the lattice has {sites} sites for {} grains", grains.len());
+        let help = "take fewer or smaller grains, a larger region, or less clearance; arrangement = \"random\" packs more closely";
+        (message, help)
+    })?;
+    let pairs = centres.iter().zip(radii);
+    let spheres: Vec<Sphere> =
+        pairs.map(|(centre, radius)| Sphere { centre: *centre, radius }).collect();
     if !region.clear(&spheres) {
         let message = "the packing runs into grains that already stand there";
         let help = "choose a region that is free, or arrangement = \"random\"";
-        return check.refuse(region_span, message, help);
+        return Err((message.into(), help));
     }
-    for (grain, centre) in packed.iter_mut().zip(centres) {
-        grain.position = Some(Position(centre.to_array().to_vec()).into());
-    }
-    Some(packed)
+    Ok(centres)
 }
 
-/// Returns the grains of a packing without their positions, and their bounding radii [m].
+/// Returns random centres [m]: of separate bounding spheres, or else of grains whose surfaces are
+/// separate. The error is a message and the help.
+fn random_places(
+    region: &Region,
+    grains: &[Grain],
+    random: &mut Random,
+) -> Result<Vec<DVec3>, (String, &'static str)> {
+    let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
+    let found = region.random(&radii, random);
+    found.or_else(|| close_places(region, grains, random)).ok_or_else(|| {
+        let volume: f64 = grains.iter().map(|grain| grain.shape.volume()).sum();
+        let percent = 100.0 * volume / region.volume();
+        let message = format!(
+            "{} grains, {percent:.0} % of the volume of the region, find no places without touching",
+            grains.len()
+        );
+        (message, "take fewer or smaller grains, a larger region, or less clearance")
+    })
+}
+
+/// Returns the grains of a packing without their positions, as written and as bodies.
 fn members(
     check: &mut Checker,
     grains: &mut Grains,
     raw: &Located<RawPacking>,
     random: &mut Random,
-) -> Option<(Vec<RawGrain>, Vec<f64>)> {
+) -> Option<(Vec<RawGrain>, Vec<Grain>)> {
     let diameters = raw.equivalent_diameter.as_ref().map(|range| {
         let Bounds { from, to } = range.value.0;
         (from.si, to.si, &range.span)
@@ -103,7 +135,7 @@ fn members(
     }
     let files = raw.files.len();
     let mut packed = Vec::with_capacity(raw.count.value);
-    let mut radii = Vec::with_capacity(raw.count.value);
+    let mut bodies = Vec::with_capacity(raw.count.value);
     for n in 0..raw.count.value {
         let kind = n % (files + raw.shapes.len());
         let mut grain = RawGrain {
@@ -121,13 +153,16 @@ fn members(
             let d = if to > from { from + (to - from) * random.random::<f64>() } else { from };
             grain.equivalent_diameter = Some(Located::at(Quantity::new(d), span.clone()));
         }
+        let mut quaternion = DQuat::IDENTITY;
         if raw.orientation == PackingOrientation::Random {
-            grain.orientation = Orientation::Quaternion(orientation(random)).into();
+            quaternion = orientation(random);
+            grain.orientation = Orientation::Quaternion(quaternion).into();
         }
         let located = Located::at(grain.clone(), raw.span.clone());
         let shape = shape(check, &mut grains.library, &located, &mut grain.clone())?;
-        radii.push(shape.bounding_radius());
+        let turned = Grain::new(shape, raw.density.si).with_orientation(quaternion);
+        bodies.push(turned);
         packed.push(grain);
     }
-    Some((packed, radii))
+    Some((packed, bodies))
 }

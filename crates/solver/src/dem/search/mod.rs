@@ -14,7 +14,7 @@ mod patch_tree;
 mod patches;
 mod surface;
 
-pub use gap::{Outside, Overlap, initial_overlaps, outside, surface_gap, wall_gap};
+pub use gap::{Gap, Outside, Overlap, gaps, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ContactPatch, ContactPoint};
 pub(super) use patches::{PatchTree, PosedShape};
 pub(crate) use surface::is_sphere;
