@@ -74,7 +74,7 @@ pub enum Arrangement {
     /// A cubic lattice, filled from below, each site shifted at random.
     #[default]
     Lattice,
-    /// Random positions without overlap of the bounding spheres; if they do not fit, of the surfaces.
+    /// Random positions without overlap of the bounding spheres, or else of the surfaces.
     Random,
 }
 

@@ -67,9 +67,9 @@ fn closest_point(owner: &Grain, field: &PartnerField, limit: f64) -> Option<Surf
     start.map(|start| minimise_distance(&owner.shape, field, start, limits))
 }
 
-/// Smallest distance of the surface of `owner` in the field of `other` [m], infinite beyond `limit`,
-/// and the direction in which a shift of `owner` widens it; `branch` is the vector from the centroid
-/// of `owner` to that of `other` [m].
+/// Smallest distance of the surface of `owner` in the field of `other` [m] (infinite beyond
+/// `limit`), and the direction in which a shift of `owner` widens it; `branch` is the vector from
+/// the centroid of `owner` to that of `other` [m].
 fn one_way_gap(owner: &Grain, other: &Grain, branch: DVec3, limit: f64) -> (f64, DVec3) {
     let to_other = DMat3::from_quat(other.pose.orientation.conjugate());
     let rotation = to_other * DMat3::from_quat(owner.pose.orientation);
