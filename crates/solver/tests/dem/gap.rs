@@ -2,9 +2,12 @@
 
 use crate::clouds::Random;
 use crate::support::{floor, open_box, sphere};
-use glam::DVec3;
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use grainwake_shape::{ShapeOptions, analytic};
 use grainwake_solver::dem::{
-    Enclosure, Partner, Side, initial_overlaps, outside, surface_gap, wall_gap,
+    Enclosure, Grain, Partner, Side, gaps, initial_overlaps, outside, surface_gap, wall_gap,
 };
 
 #[test]
@@ -37,6 +40,65 @@ fn gap_takes_the_nearest_image() {
     let b = sphere(0.1, 1.0, 60, DVec3::new(0.9, 1.9, 0.6));
     let expected = DVec3::new(0.2, 0.3, 0.1).length() - 0.2;
     assert!((surface_gap(&a, &b, &enclosure) - expected).abs() < 1e-9);
+}
+
+/// Turned ellipsoids at random places of a box that is periodic along x and z.
+fn turned_ellipsoids() -> (Vec<Grain>, Enclosure) {
+    let options = ShapeOptions { nodes: Some(400), ..ShapeOptions::default() };
+    let shape = Arc::new(analytic::ellipsoid(0.5, 0.3, 0.2, &options).unwrap());
+    let mut random = Random(5);
+    let mut turned = || {
+        Grain::new(shape.clone(), 1.0)
+            .with_position(3.0 * random.vector())
+            .with_orientation(DQuat::from_scaled_axis(3.0 * random.vector()))
+    };
+    let grains = (0..40).map(|_| turned()).collect();
+    let enclosure = Enclosure {
+        lower: DVec3::splat(-1.5),
+        upper: DVec3::splat(1.5),
+        periodic: [true, false, true],
+        sides: Default::default(),
+    };
+    (grains, enclosure)
+}
+
+#[test]
+fn gaps_below_a_limit_are_those_of_all_pairs() {
+    let (grains, enclosure) = turned_ellipsoids();
+    let found = gaps(&grains, &enclosure, 0.15);
+    let mut expected = Vec::new();
+    for (j, b) in grains.iter().enumerate() {
+        for (i, a) in grains[..j].iter().enumerate() {
+            let gap = surface_gap(a, b, &enclosure);
+            if gap < 0.15 {
+                expected.push((i, j, gap));
+            }
+        }
+    }
+    expected.sort_by_key(|pair| (pair.0, pair.1));
+    let found: Vec<(usize, usize, f64)> =
+        found.iter().map(|gap| (gap.first, gap.second, gap.distance)).collect();
+    assert!(found.len() > 30 && found.iter().any(|pair| pair.2 > 0.0), "{}", found.len());
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert_eq!((found.0, found.1), (expected.0, expected.1));
+        assert!((found.2 - expected.2).abs() < 1e-12, "{found:?} v {expected:?}");
+    }
+}
+
+#[test]
+fn a_shift_along_its_direction_widens_a_gap() {
+    let (grains, enclosure) = turned_ellipsoids();
+    let shift = 1e-3;
+    let mut tested = 0;
+    for gap in gaps(&grains, &enclosure, 0.15).iter().filter(|gap| gap.distance > -0.05) {
+        let moved = grains[gap.second].pose.position + shift * gap.direction;
+        let second = grains[gap.second].clone().with_position(moved);
+        let wider = surface_gap(&grains[gap.first], &second, &enclosure) - gap.distance;
+        assert!((0.9 * shift..1.1 * shift).contains(&wider), "{gap:?}: wider by {wider}");
+        tested += 1;
+    }
+    assert!(tested > 20, "{tested}");
 }
 
 #[test]

@@ -56,7 +56,8 @@ fn closest_point(owner: &Grain, field: &PartnerField, limit: f64) -> Option<Surf
     let (mut least, mut nearest) = (limit + spacing, None);
     for node in owner.shape.nodes() {
         let distance = field.distance_within(node.position, least.max(0.0));
-        if distance < least {
+        // A grain whose pose is not a number has such a distance.
+        if distance < least || distance.is_nan() {
             (least, nearest) = (distance, Some(node.position));
         }
     }
