@@ -9,7 +9,7 @@ use grainwake_run::FailureKind;
 use grainwake_run::number_format::size;
 use grainwake_study::{
     Analysis, Archive, MANIFEST, Options, Outcome, Plan, Run, RunRecord, RunState, Selection,
-    StudyError, execute, expected_cost, records, run_state, write_tables,
+    StudyError, execute, expected_cost, note_on_unmeasured, records, run_state, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -121,6 +121,9 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     }
     if !args.quiet {
         tell!("{}", folder.join("table.csv").display());
+        if let Some(note) = note_on_unmeasured(shown) {
+            tell!("note: {note}");
+        }
         if study.analysis == Analysis::default() {
             tell!(
                 "note: `grainwake report {}` draws the figures; claims and more figures come with an `analysis` file (docs/reference/study-file.md)",
@@ -145,7 +148,8 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
         return Err(Exit::with_help(
             INTERRUPTED,
             format!(
-                "interrupted with {open} runs unfinished; those that had started have a checkpoint"
+                "interrupted with {} unfinished; those that had started have a checkpoint",
+                count(open, "run")
             ),
             "continue with the same command",
         ));
@@ -260,7 +264,7 @@ fn pretty(rows: &[&RunRecord]) -> Table {
         ("turned [deg]", "turned"),
     ];
     let settling = rows.iter().any(|row| row.settling.is_some());
-    let pairs = !settling || rows.iter().any(|row| row.pair.is_some());
+    let pairs = rows.iter().any(|row| row.pair.is_some());
     let columns: Vec<(&str, &str)> = [(pairs, PAIR), (settling, SETTLING)]
         .into_iter()
         .filter(|(shown, _)| *shown)

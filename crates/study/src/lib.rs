@@ -26,7 +26,7 @@ pub use analysis::{correlation, factor_mean, kissing, observation, statistics, s
 pub use error::StudyError;
 pub use measure::cost::{Cost, expected_cost};
 pub use measure::pair::{PairHistory, PairMeasures};
-pub use measure::record::{RunRecord, records};
+pub use measure::record::{RunRecord, note_on_unmeasured, records};
 pub use measure::settling::{GrainSettling, SettlingMeasures};
 pub use measure::table::{columns, to_csv, write_tables};
 pub use measure::trajectory::Trajectory;

@@ -30,7 +30,7 @@ pub struct NewGrain {
     #[arg(short, long, value_name = "FILE.grain")]
     pub output: PathBuf,
     /// Rescale to this diameter of the sphere of equal volume, for example "2 mm"
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub equivalent_diameter: Option<String>,
     #[command(flatten)]
     pub common: GrainOptions,
@@ -59,7 +59,7 @@ pub struct FromMeshArgs {
     /// Mesh (.stl, .ply, .obj) or spherical-harmonic coefficients (.anm)
     pub mesh: PathBuf,
     /// Length of one unit of the file, for example "1 mm"
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub unit: String,
     /// Invert a mesh with inward normals
     #[arg(long)]
@@ -74,7 +74,7 @@ pub struct FromScanArgs {
     /// Image: multi-page .tif, .npy, .npz, .nrrd, .mha, or a folder of .tif slices
     pub image: PathBuf,
     /// Edge length of a voxel, for example "12 um"
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub voxel: String,
     /// Label of a single grain [default: all]
     #[arg(long, value_name = "N")]
@@ -139,7 +139,7 @@ pub struct FamilyArgs {
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
     /// Diameter of the sphere of equal volume of all grains
-    #[arg(long, default_value = "2 mm", value_name = "LENGTH")]
+    #[arg(long, default_value = "2 mm", value_name = "LENGTH", allow_hyphen_values = true)]
     pub equivalent_diameter: String,
     /// Folder for 01.grain, 02.grain, ... (row by row), table.csv and sheet.png
     #[arg(short, long, value_name = "DIR")]
@@ -231,7 +231,7 @@ pub struct ExportArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Length of one unit of the mesh, for example "1 mm"
-    #[arg(long, value_name = "LENGTH", default_value = "1 m")]
+    #[arg(long, value_name = "LENGTH", default_value = "1 m", allow_hyphen_values = true)]
     pub unit: String,
     /// Replace an existing file
     #[arg(long)]

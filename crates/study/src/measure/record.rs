@@ -164,6 +164,22 @@ fn no_periods(periods: &[Option<f64>; 3]) -> bool {
     periods.iter().all(Option::is_none)
 }
 
+/// Returns a note about the finished runs without anything to measure; none if there are none.
+pub fn note_on_unmeasured<'a>(records: impl IntoIterator<Item = &'a RunRecord>) -> Option<String> {
+    let measured = |r: &RunRecord| r.pair.is_some() || r.settling.is_some();
+    let bare = |r: &&RunRecord| r.finished() && r.remark.is_none() && !measured(r);
+    let names: Vec<&str> = records.into_iter().filter(bare).map(|r| r.name.as_str()).collect();
+    let (first, others) = names.split_first()?;
+    let who = match others.len() {
+        0 => format!("run {first} has"),
+        n => format!("{} runs have", n + 1),
+    };
+    Some(format!(
+        "{who} no measured values, because gravity is zero or no grain moves; the tables of each \
+         run are in its folder"
+    ))
+}
+
 /// Reads the records of all runs of a study.
 ///
 /// A run without a folder keeps its values in `table.json`, so that run folders may be removed. So

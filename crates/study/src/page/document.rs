@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use super::Content;
 use super::{kissing, pairs, settling, tables};
 use crate::analysis::verdict::Verdict;
-use crate::measure::record::RunRecord;
+use crate::measure::record::{RunRecord, note_on_unmeasured};
 use crate::run::state::StateKind;
 
 /// Number of runs that are named where very many are in the same state.
@@ -63,14 +63,18 @@ impl Content<'_> {
         let finished = finished.count();
         let verdicts = |v: Verdict| self.findings.iter().filter(|f| f.verdict == v).count();
         html! {
-            (finished) " of " (self.records.len()) " runs are finished"
+            (finished) " of " (self.records.len())
+            (if self.records.len() == 1 { " run is finished" } else { " runs are finished" })
             (settling::lead(self.records))
             @if finished > 0 && self.has_pairs() { (pairs::lead(self.records)) }
             @if !self.findings.is_empty() {
                 ". Of " (self.findings.len()) " claims, " (verdicts(Verdict::Holds)) " hold, "
                 (verdicts(Verdict::Contradicted)) " are contradicted and " (verdicts(Verdict::Open)) " are open"
             }
-            ". Times are in √(d/g), lengths in the equivalent diameter d, speeds in √(d g)."
+            "."
+            @if self.has_settling() || self.has_pairs() {
+                " Times are in √(d/g), lengths in the equivalent diameter d, speeds in √(d g)."
+            }
         }
     }
 
@@ -92,6 +96,7 @@ impl Content<'_> {
         let ended = self.records.iter().filter(|r| r.state == Failed || r.finished());
         let reason = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
         out.extend(ended.filter_map(reason));
+        out.extend(note_on_unmeasured(self.records));
         out.extend(self.notes.iter().cloned());
         out
     }

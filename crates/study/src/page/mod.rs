@@ -57,9 +57,9 @@ impl Content<'_> {
         self.records.iter().any(|r| r.settling.is_some())
     }
 
-    /// Returns whether any finished run is a pair, or no run has finished.
+    /// Returns whether any run has measured values of a pair.
     pub fn has_pairs(&self) -> bool {
-        !self.has_settling() || self.records.iter().any(|r| r.pair.is_some())
+        self.records.iter().any(|r| r.pair.is_some())
     }
 
     /// Returns whether every model was run only once.

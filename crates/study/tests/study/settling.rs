@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::common::plan;
 use crate::files::DRY;
 use grainwake_study::{
-    Options, Outcome, Plan, RunRecord, StudyError, StudyObserver, execute, records, render,
+    Options, Outcome, Plan, RunRecord, StudyError, StudyObserver, execute, note_on_unmeasured,
+    records, render,
 };
 
 struct Quiet;
@@ -38,10 +39,15 @@ fn case(grains: usize) -> String {
 }
 
 fn carried_out(grains: usize) -> (tempfile::TempDir, PathBuf, Plan) {
+    carry_out(grains, STUDY)
+}
+
+/// Runs a study of two models.
+fn carry_out(grains: usize, study: &str) -> (tempfile::TempDir, PathBuf, Plan) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("case.toml"), case(grains)).unwrap();
     let path = folder.path().join("study.toml");
-    std::fs::write(&path, STUDY).unwrap();
+    std::fs::write(&path, study).unwrap();
     let plan = plan(&path).unwrap();
     let out = folder.path().join("out");
     plan.create_folder(&out).unwrap();
@@ -69,6 +75,18 @@ fn page(out: &Path) -> String {
         text.push(' ');
     }
     text
+}
+
+#[test]
+fn without_gravity_the_page_says_why_nothing_is_measured() {
+    let weightless = STUDY.replace("-5]", "0]").replace("-10]", "0]");
+    let (_folder, out, plan) = carry_out(1, &weightless);
+    let note = note_on_unmeasured(&rows(&plan, &out)).unwrap();
+    assert!(note.starts_with("2 runs have no measured values, because gravity is zero"), "{note}");
+    render(&out).unwrap();
+    let page = page(&out);
+    assert!(page.contains(&note) && page.contains("2 of 2 runs are finished."), "{page}");
+    assert!(!page.contains("kiss") && !page.contains("pair"), "{page}");
 }
 
 #[test]
