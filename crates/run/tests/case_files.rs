@@ -468,6 +468,47 @@ fn boundary_layers_are_warned_of_from_five_percent() {
 }
 
 #[test]
+fn unbalanced_weights_without_walls_are_warned_of() {
+    let case = |density: f64, acceleration: &str| {
+        let text = format!(
+            r#"
+            gravity = [0, 0, -10]
+            [fluid]
+            density = 1000
+            viscosity = "5 mPa s"
+            body_acceleration = {acceleration}
+            [domain]
+            size = ["10 mm", "10 mm", "20 mm"]
+            cell_size = "0.5 mm"
+            boundaries = {{ x = "periodic", y = "periodic", z = "periodic" }}
+            [[packing]]
+            count = 8
+            shapes = [{{ kind = "sphere", diameter = "4 mm" }}]
+            density = {density}
+            [time]
+            end = 0.1
+            "#
+        );
+        good(&text).estimate(1).warnings.join("\n")
+    };
+    // 8 spheres of 33.51 mm3 in 2000 mm3: the excess of 500 kg/m3 takes 0.6702 m/s2.
+    let none = case(1500.0, "[0, 0, 0]");
+    assert!(none.contains("fixed grain carries the weight: grains and fluid fall"), "{none}");
+    assert!(none.contains("body_acceleration = [0, 0, 0.670206] (m/s2) balances it"), "{none}");
+    let little = case(1500.0, "[0.1, 0, 0.3]");
+    assert!(little.contains("does not balance the weight: grains and fluid fall"), "{little}");
+    assert!(little.contains("body_acceleration = [0.1, 0, 0.670206]"), "{little}");
+    let much = case(1500.0, "[0, 0, 0.7]");
+    assert!(much.contains("is more than the weight: grains and fluid rise"), "{much}");
+    let light = case(500.0, "[0, 0, 0]");
+    assert!(light.contains("holds the grains down: grains and fluid rise"), "{light}");
+    assert!(light.contains("body_acceleration = [0, 0, -0.670206]"), "{light}");
+    let quiet =
+        [case(1500.0, "[0, 0, 0.67]"), case(500.0, "[0, 0, -0.67]"), case(1000.0, "[0, 0, 0]")];
+    assert!(quiet.iter().all(|text| !text.contains("faster and faster")), "{quiet:?}");
+}
+
+#[test]
 fn ways_out_are_warned_of() {
     let warnings = |from: &str, to: &str| {
         assert!(PAIR.contains(from), "{from}");
@@ -501,7 +542,7 @@ fn ways_out_are_warned_of() {
     assert!(float.contains("make no waves and feel no splash and no surface tension"), "{float}");
     // 2 x 500 kg/m^3 x 4.19 mm^3 g over 1000 kg/m^3 x 60.9 cm^3.
     let fall = walls("\"periodic\"");
-    assert!(fall.contains("body_acceleration = [0, 0, 6.7433e-4]"), "{fall}");
+    assert!(fall.contains("body_acceleration = [0, 0, 0.000674331]"), "{fall}");
     let position = "position = [\"12.5 mm\", \"12.5 mm\", \"80 mm\"]";
     let given =
         warnings(position, &format!("{position}\nmotion = {{ velocity = [0, 0, \"-0.1 m/s\"] }}"));

@@ -8,7 +8,7 @@ use glam::DVec3;
 use crate::case::estimate::Estimate;
 use crate::case::expect::{Expectation, Measure};
 use crate::case::settling::{expected_time_step, is_free};
-use crate::number_format::{AXES, SIDES, quantity};
+use crate::number_format::{AXES, SIDES, number, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
@@ -22,6 +22,8 @@ const ABSURD_STEPS: f64 = 100_000_000.0;
 const ORDINARY_DENSITIES: std::ops::RangeInclusive<f64> = 5.0..=25_000.0;
 /// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
 const ABSURD_REYNOLDS: f64 = 1e-4;
+/// Part of the weight that a body acceleration may leave without a warning.
+const BALANCE_TOLERANCE: f64 = 0.01;
 
 /// Returns all warnings of a case.
 pub(super) fn warnings(
@@ -137,9 +139,8 @@ fn unsupported_weight(setup: &Setup) -> Option<String> {
                 || walls.iter().any(|wall| !matches!(wall, Boundary::Slip | Boundary::FreeSurface)))
     };
     let held = setup.grains.iter().any(|grain| !is_free(grain));
-    let driven =
-        fluid.body_acceleration != DVec3::ZERO || setup.prescription.body_acceleration.is_some();
-    if setup.gravity == DVec3::ZERO || held || driven || (0..3).any(holds) {
+    let varies = setup.prescription.body_acceleration.is_some();
+    if setup.gravity == DVec3::ZERO || held || varies || (0..3).any(holds) {
         return None;
     }
     let excess = |grain: &Grain| (grain.density - fluid.density) * grain.shape.volume();
@@ -147,16 +148,21 @@ fn unsupported_weight(setup: &Setup) -> Option<String> {
     // The acceleration drives the displaced fluid too: a grain takes the pressure gradient.
     let volume = setup.mesh.extent().element_product();
     let balance = -weight / (fluid.density * volume) * setup.gravity;
-    (weight != 0.0).then(|| {
-        let balance = balance.to_array().map(|a| match a == 0.0 {
-            true => "0".into(),
-            false => format!("{a:.4e}"),
-        });
-        format!(
-            "no wall and no fixed grain carries the weight: grains and fluid fall together, faster and faster; [fluid] body_acceleration = [{}] (m/s2) balances it",
-            balance.join(", ")
-        )
-    })
+    let given = fluid.body_acceleration;
+    let missing = (balance - given).project_onto(setup.gravity);
+    if weight == 0.0 || missing.length() <= BALANCE_TOLERANCE * balance.length() {
+        return None;
+    }
+    let (motion, cause) = match (missing.dot(setup.gravity) < 0.0, given == DVec3::ZERO) {
+        (true, true) => ("fall", "no wall and no fixed grain carries the weight"),
+        (false, true) => ("rise", "no wall and no fixed grain holds the grains down"),
+        (true, false) => ("fall", "[fluid] body_acceleration does not balance the weight"),
+        (false, false) => ("rise", "[fluid] body_acceleration is more than the weight"),
+    };
+    let balanced = (given + missing).to_array().map(number).join(", ");
+    Some(format!(
+        "{cause}: grains and fluid {motion} together, faster and faster; [fluid] body_acceleration = [{balanced}] (m/s2) balances it"
+    ))
 }
 
 /// Prescribed motions through a wall.
