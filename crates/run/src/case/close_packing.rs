@@ -1,5 +1,5 @@
 //! Random places of grains that lie closer than their bounding spheres allow: random places in a
-//! larger box, which then shrinks to the box of the case, while grains that touch move apart.
+//! larger region, which then shrinks to that of the case, while grains that touch move apart.
 
 use glam::DVec3;
 
@@ -7,17 +7,24 @@ use super::packing::{Random, Region};
 use super::placement::extent_along;
 use grainwake_solver::dem::{self, Enclosure, Gap, Grain};
 
-/// Largest solid fraction that is tried; that of the densest lattice of equal spheres is 0.74.
+/// Largest solid fraction that is tried, half of the clearance included; that of the densest
+/// lattice of equal spheres is 0.74.
 const LARGEST_FRACTION: f64 = 0.74;
-/// Ratio of the lengths of two boxes that are tried at the start.
+/// Largest solid fraction of the bounding spheres in the first region.
+const FIRST_FRACTION: f64 = 0.25;
+/// Ratio of the lengths of two regions that are tried at the start.
 const GROWTH: f64 = 1.1;
-/// Ratio of the lengths of a box to those of the one before: two grains that touch then overlap by
-/// 5 % of the distance of their centres.
+/// Ratio of the lengths of a region to those of the one before: two grains that touch then overlap
+/// by 5 % of the distance of their centres.
 const REDUCTION: f64 = 0.95;
-/// Most rounds of displacements in each box but the last.
+/// Number of random starts: flat grains may block each other between two walls.
+const ATTEMPTS: usize = 3;
+/// Most rounds of displacements in each region but the last.
 const ROUNDS: usize = 20;
-/// Most rounds of displacements in the last box.
-const LAST_ROUNDS: usize = 300;
+/// Most rounds of displacements in the last region.
+const LAST_ROUNDS: usize = 600;
+/// Rounds in which the sum of the missing distances must fall by a tenth.
+const PROGRESS_ROUNDS: usize = 60;
 /// Distance beyond the clearance to which grains move apart [smallest equivalent diameter].
 const SLACK: f64 = 0.01;
 /// Part of the missing distance by which two grains move apart in a round.
@@ -31,12 +38,18 @@ pub(super) fn close_places(
     grains: &[Grain],
     random: &mut Random,
 ) -> Option<Vec<DVec3>> {
-    let volume: f64 = grains.iter().map(|grain| grain.shape.volume()).sum();
-    if volume > LARGEST_FRACTION * region.volume() {
+    let solid = fraction(region, grains, |grain| grain.shape.equivalent_diameter());
+    if solid > LARGEST_FRACTION || !grains.iter().all(|grain| has_room(region, grain)) {
         return None;
     }
+    (0..ATTEMPTS).find_map(|_| shrink(region, grains, random))
+}
+
+/// Returns places of the grains at the end of a sequence of smaller and smaller regions.
+fn shrink(region: &Region, grains: &[Grain], random: &mut Random) -> Option<Vec<DVec3>> {
     let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
-    let mut scale = GROWTH;
+    let spheres = fraction(region, grains, |grain| 2.0 * grain.shape.bounding_radius());
+    let mut scale = (spheres / FIRST_FRACTION).cbrt().max(GROWTH);
     let starts = loop {
         match enlarged(region, scale).random(&radii, random) {
             Some(centres) => break centres,
@@ -59,6 +72,13 @@ pub(super) fn close_places(
     apart.then(|| centres.collect())
 }
 
+/// Returns the fraction of the region that spheres of the given diameters [m] take, half of the
+/// clearance included.
+fn fraction(region: &Region, grains: &[Grain], diameter: fn(&Grain) -> f64) -> f64 {
+    let cubes = grains.iter().map(|grain| (diameter(grain) + region.clearance).powi(3));
+    std::f64::consts::PI / 6.0 * cubes.sum::<f64>() / region.volume()
+}
+
 /// Returns the region with all lengths multiplied by `scale`, but the grains and the clearance.
 fn enlarged(region: &Region, scale: f64) -> Region {
     let Enclosure { lower, upper, .. } = region.enclosure;
@@ -73,17 +93,21 @@ fn enlarged(region: &Region, scale: f64) -> Region {
     }
 }
 
-/// Moves grains apart until they keep the clearance, at most `rounds` times; returns whether they
-/// do.
+/// Moves grains into the region and apart until they keep the clearance; returns whether they do.
+/// It gives up after `rounds`, or when they hardly come apart any more.
 fn move_apart(region: &Region, grains: &mut [Grain], rounds: usize) -> bool {
     let ranges: Vec<[DVec3; 2]> = grains.iter().map(|grain| centre_range(region, grain)).collect();
-    if ranges.iter().any(|[low, high]| !low.cmple(*high).all()) {
-        return false;
-    }
     let diameters = grains.iter().map(|grain| grain.shape.equivalent_diameter());
     let aim = region.clearance + SLACK * diameters.fold(f64::INFINITY, f64::min);
     let count = grains.len();
-    for _ in 0..rounds {
+    let mut to_beat = f64::INFINITY;
+    for round in 0..rounds {
+        for (grain, [low, high]) in grains.iter_mut().zip(&ranges) {
+            let inside = grain.pose.position.clamp(*low, *high);
+            for axis in (0..3).filter(|axis| !region.spans_period(*axis)) {
+                grain.pose.position[axis] = inside[axis];
+            }
+        }
         let all: Vec<Grain> = grains.iter().chain(&region.placed).cloned().collect();
         let mut gaps = dem::gaps(&all, &region.enclosure, aim);
         // Placed grains stay. A grain that touches its own image is refused later.
@@ -91,23 +115,31 @@ fn move_apart(region: &Region, grains: &mut [Grain], rounds: usize) -> bool {
         if gaps.iter().all(|gap| gap.distance >= region.clearance) {
             return true;
         }
-        let mut shifts = vec![DVec3::ZERO; all.len()];
-        for Gap { first, second, distance, direction } in gaps {
-            let share = if second < count { 0.5 } else { 1.0 };
-            let shift = share * RELAXATION * (aim - distance) * direction;
-            shifts[first] -= shift;
-            shifts[second] += shift;
+        if round % PROGRESS_ROUNDS == 0 {
+            let missing = gaps.iter().map(|gap| aim - gap.distance).sum::<f64>();
+            if missing > to_beat {
+                return false;
+            }
+            to_beat = 0.9 * missing;
         }
-        for ((grain, shift), [low, high]) in grains.iter_mut().zip(shifts).zip(&ranges) {
-            let moved = grain.pose.position + shift;
-            let clamped = moved.clamp(*low, *high);
-            for axis in 0..3 {
-                let free = region.spans_period(axis);
-                grain.pose.position[axis] = if free { moved[axis] } else { clamped[axis] };
+        for Gap { first, second, distance, direction } in gaps {
+            let shift = RELAXATION * (aim - distance) * direction;
+            // Of two grains the smaller one moves farther.
+            let [one, other] = [first, second].map(|index| all[index].shape.volume());
+            let share = if second < count { other / (one + other) } else { 1.0 };
+            grains[first].pose.position -= share * shift;
+            if second < count {
+                grains[second].pose.position += (1.0 - share) * shift;
             }
         }
     }
     false
+}
+
+/// Returns whether a grain fits into the region.
+fn has_room(region: &Region, grain: &Grain) -> bool {
+    let [low, high] = centre_range(region, grain);
+    low.cmple(high).all()
 }
 
 /// Range of the centre of a grain in the region [m], lower and upper corner.
@@ -127,16 +159,20 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use grainwake_shape::{ShapeOptions, analytic};
-    use grainwake_solver::dem::{Side, initial_overlaps, outside};
+    use grainwake_shape::{Shape, ShapeOptions, analytic};
+    use grainwake_solver::dem::{Side, outside};
     use rand::SeedableRng;
 
-    /// Ellipsoids of 2 : 1.2 : 1, long and short ones, in random orientations; unit volume.
-    fn ellipsoids(count: usize) -> Vec<Grain> {
-        let unit = (4.0 / 3.0 * std::f64::consts::PI * 2.4f64).cbrt().recip();
+    /// Ellipsoid of unit volume with axes in the given ratios.
+    fn ellipsoid(axes: [f64; 3]) -> Arc<Shape> {
+        let volume = std::f64::consts::PI / 6.0 * axes.iter().product::<f64>();
+        let [a, b, c] = axes.map(|axis| 0.5 * axis / volume.cbrt());
         let options = ShapeOptions { nodes: Some(300), ..ShapeOptions::default() };
-        let shape = analytic::ellipsoid(2.0 * unit, 1.2 * unit, unit, &options).unwrap();
-        let shape = Arc::new(shape);
+        Arc::new(analytic::ellipsoid(a, b, c, &options).unwrap())
+    }
+
+    /// Grains of one shape in random orientations.
+    fn turned(shape: &Arc<Shape>, count: usize) -> Vec<Grain> {
         let mut random = Random::seed_from_u64(5);
         let mut turned = || {
             let orientation = crate::case::packing::orientation(&mut random);
@@ -145,51 +181,103 @@ mod tests {
         (0..count).map(|_| turned()).collect()
     }
 
-    fn region(periodic: bool, clearance: f64, placed: Vec<Grain>) -> Region {
+    fn ball(radius: f64, position: DVec3) -> Grain {
+        let sphere = analytic::sphere(radius, &ShapeOptions::default()).unwrap();
+        Grain::new(sphere, 1.0).with_position(position)
+    }
+
+    /// Box of 5 x 5 x 8 away from the origin, filled as a whole.
+    fn whole_box(periodic: bool, clearance: f64) -> Region {
         let (lower, upper) = (DVec3::new(-3.0, 2.0, 0.0), DVec3::new(2.0, 7.0, 8.0));
         let sides = [[Side::WALL; 2]; 3];
         let enclosure = Enclosure { lower, upper, periodic: [periodic, periodic, false], sides };
-        Region { lower, upper, clearance, enclosure, placed }
+        Region { lower, upper, clearance, enclosure, placed: Vec::new() }
     }
 
-    fn placed_at(grains: &[Grain], centres: &[DVec3]) -> Vec<Grain> {
-        let pairs = grains.iter().zip(centres);
-        pairs.map(|(grain, centre)| grain.clone().with_position(*centre)).collect()
+    /// Places the grains and checks that they keep the clearance from each other, from the placed
+    /// ones and from the faces of the region; returns the centres and the gaps below 0.1.
+    fn checked(region: &Region, grains: &[Grain], seed: u64) -> Option<(Vec<DVec3>, Vec<Gap>)> {
+        let centres = close_places(region, grains, &mut Random::seed_from_u64(seed))?;
+        let pairs = grains.iter().zip(&centres);
+        let mut all: Vec<Grain> =
+            pairs.map(|(grain, centre)| grain.clone().with_position(*centre)).collect();
+        let clear = Enclosure {
+            lower: region.lower + region.clearance,
+            upper: region.upper - region.clearance,
+            periodic: [0, 1, 2].map(|axis| region.spans_period(axis)),
+            sides: [[Side::WALL; 2]; 3],
+        };
+        let beyond = |all: &[Grain]| outside(all, &clear).iter().map(|o| o.by).fold(0.0, f64::max);
+        assert!(beyond(&all) < 1e-9, "{}", beyond(&all));
+        all.extend(region.placed.iter().cloned());
+        let gaps = dem::gaps(&all, &region.enclosure, 0.1);
+        let moved = |gap: &&Gap| gap.first < grains.len();
+        assert!(gaps.iter().filter(moved).all(|gap| gap.distance >= region.clearance));
+        Some((centres, gaps))
     }
 
     #[test]
     fn surfaces_keep_the_clearance_where_bounding_spheres_find_no_place() {
-        let ball = Grain::new(analytic::sphere(1.0, &ShapeOptions::default()).unwrap(), 1.0)
-            .with_position(DVec3::new(-0.5, 4.5, 4.0));
         // Solid fraction 0.35, or 0.37 with the sphere.
-        let grains = ellipsoids(70);
+        let grains = turned(&ellipsoid([2.0, 1.2, 1.0]), 70);
         let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
         for periodic in [false, true] {
-            let region = region(periodic, 0.02, vec![ball.clone()]);
+            let mut region = whole_box(periodic, 0.02);
+            region.placed.push(ball(1.0, DVec3::new(-0.5, 4.5, 4.0)));
             assert_eq!(region.random(&radii, &mut Random::seed_from_u64(1)), None);
+            let (centres, gaps) = checked(&region, &grains, 1).unwrap();
+            assert!(gaps.len() > 100, "{} gaps", gaps.len());
             let places = || close_places(&region, &grains, &mut Random::seed_from_u64(1)).unwrap();
-            let centres = places();
-            let mut all = placed_at(&grains, &centres);
-            all.push(ball.clone());
-            assert_eq!(initial_overlaps(&all, &region.enclosure), []);
-            assert_eq!(outside(&all, &region.enclosure), []);
-            let near = dem::gaps(&all, &region.enclosure, 0.1);
-            assert!(near.len() > 100, "{} near pairs", near.len());
-            assert!(near.iter().all(|gap| gap.distance >= 0.02));
-            assert_eq!(centres, places());
             let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
             assert_eq!(centres, pool.install(places));
         }
     }
 
     #[test]
+    fn a_part_of_the_box_is_filled_between_placed_grains() {
+        let mut region = whole_box(true, 0.02);
+        (region.lower, region.upper) = (DVec3::new(-3.0, 2.5, 1.0), DVec3::new(2.0, 6.0, 5.0));
+        // Two placed grains overlap: they stay as they are.
+        let places = [[0.0, 2.0, 3.0], [-2.5, 4.0, 5.0], [-2.4, 4.0, 6.0]];
+        region.placed = places.map(|x| ball(0.6, DVec3::from_array(x))).to_vec();
+        let grains = turned(&ellipsoid([2.0, 1.2, 1.0]), 22);
+        assert!(checked(&region, &grains, 1).is_some());
+    }
+
+    #[test]
+    fn flat_grains_stay_within_a_thin_region() {
+        let shape = ellipsoid([4.0, 4.0, 1.0]);
+        let mut region = whole_box(false, 0.0);
+        let thickness = 1.02 * (shape.upper() - shape.lower()).min_element();
+        (region.lower.z, region.upper.z) = (3.0, 3.0 + thickness);
+        for count in [1, 3] {
+            let grains = vec![Grain::new(shape.clone(), 1.0); count];
+            for seed in 1..=10 {
+                assert!(checked(&region, &grains, seed).is_some(), "{count} grains, seed {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn small_and_large_grains_mix() {
+        // Diameters of 0.4 to 3.2; solid fraction 0.42.
+        let mut grains: Vec<Grain> = (0..150).map(|_| ball(0.2, DVec3::ZERO)).collect();
+        grains.extend((0..30).map(|_| ball(0.5, DVec3::ZERO)));
+        grains.extend((0..3).map(|_| ball(1.6, DVec3::ZERO)));
+        assert!(checked(&whole_box(true, 0.0), &grains, 1).is_some());
+    }
+
+    #[test]
     fn too_many_grains_find_no_place() {
-        let places = |count| {
-            let region = region(true, 0.0, Vec::new());
-            close_places(&region, &ellipsoids(count), &mut Random::seed_from_u64(1))
-        };
-        assert!(places(90).is_some());
-        assert_eq!(places(140), None);
-        assert_eq!(places(160), None);
+        let shape = ellipsoid([2.0, 1.2, 1.0]);
+        let places =
+            |count, clearance| checked(&whole_box(true, clearance), &turned(&shape, count), 1);
+        // Solid fractions of 0.45, 0.7 and 0.8.
+        assert!(places(90, 0.0).is_some());
+        assert!(places(140, 0.0).is_none());
+        assert!(places(160, 0.0).is_none());
+        // The clearance alone fills the region, or leaves no room between the walls.
+        assert!(places(60, 0.5).is_none());
+        assert!(places(1, 3.5).is_none());
     }
 }

@@ -43,9 +43,9 @@ fn gap_takes_the_nearest_image() {
 }
 
 /// Turned ellipsoids at random places of a box that is periodic along x and z.
-fn turned_ellipsoids() -> (Vec<Grain>, Enclosure) {
-    let options = ShapeOptions { nodes: Some(400), ..ShapeOptions::default() };
-    let shape = Arc::new(analytic::ellipsoid(0.5, 0.3, 0.2, &options).unwrap());
+fn turned_ellipsoids([a, b, c]: [f64; 3], nodes: usize) -> (Vec<Grain>, Enclosure) {
+    let options = ShapeOptions { nodes: Some(nodes), ..ShapeOptions::default() };
+    let shape = Arc::new(analytic::ellipsoid(a, b, c, &options).unwrap());
     let mut random = Random(5);
     let mut turned = || {
         Grain::new(shape.clone(), 1.0)
@@ -64,12 +64,16 @@ fn turned_ellipsoids() -> (Vec<Grain>, Enclosure) {
 
 #[test]
 fn gaps_below_a_limit_are_those_of_all_pairs() {
-    let (grains, enclosure) = turned_ellipsoids();
-    let found = gaps(&grains, &enclosure, 0.15);
+    let grains = [turned_ellipsoids([0.5, 0.3, 0.2], 400), turned_ellipsoids([0.8, 0.1, 0.1], 60)];
+    grains.iter().for_each(|(grains, enclosure)| compare_with_all_pairs(grains, enclosure));
+}
+
+fn compare_with_all_pairs(grains: &[Grain], enclosure: &Enclosure) {
+    let found = gaps(grains, enclosure, 0.15);
     let mut expected = Vec::new();
     for (j, b) in grains.iter().enumerate() {
         for (i, a) in grains[..j].iter().enumerate() {
-            let gap = surface_gap(a, b, &enclosure);
+            let gap = surface_gap(a, b, enclosure);
             if gap < 0.15 {
                 expected.push((i, j, gap));
             }
@@ -88,7 +92,7 @@ fn gaps_below_a_limit_are_those_of_all_pairs() {
 
 #[test]
 fn a_shift_along_its_direction_widens_a_gap() {
-    let (grains, enclosure) = turned_ellipsoids();
+    let (grains, enclosure) = turned_ellipsoids([0.5, 0.3, 0.2], 400);
     let shift = 1e-3;
     let mut tested = 0;
     for gap in gaps(&grains, &enclosure, 0.15).iter().filter(|gap| gap.distance > -0.05) {

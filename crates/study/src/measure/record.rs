@@ -175,8 +175,8 @@ pub fn note_on_unmeasured<'a>(records: impl IntoIterator<Item = &'a RunRecord>) 
         n => format!("{} runs have", n + 1),
     };
     Some(format!(
-        "{who} no measured values, because gravity is zero or no grain moves; the tables of each \
-         run are in its folder"
+        "{who} no measured values, because gravity is zero or no grain moves by a tenth of its \
+         diameter; the tables of each run are in its folder"
     ))
 }
 

@@ -84,7 +84,7 @@ fn lattice(
     let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
     let centres = region.lattice(&radii, jitter, vertical, random).map_err(|sites| {
         let message = format!("the lattice has {sites} sites for {} grains", grains.len());
-        let help = "take fewer or smaller grains, a larger region, or less clearance; arrangement = \"random\" packs more closely";
+        let help = "take fewer or smaller grains, a larger region, or less clearance; arrangement = \"random\" may hold more grains that are not round";
         (message, help)
     })?;
     let pairs = centres.iter().zip(radii);
@@ -110,11 +110,17 @@ fn random_places(
     found.or_else(|| close_places(region, grains, random)).ok_or_else(|| {
         let volume: f64 = grains.iter().map(|grain| grain.shape.volume()).sum();
         let percent = 100.0 * volume / region.volume();
-        let message = format!(
-            "{} grains, {percent:.0} % of the volume of the region, find no places without touching",
-            grains.len()
-        );
-        (message, "take fewer or smaller grains, a larger region, or less clearance")
+        let who = match grains.len() {
+            1 => "1 grain finds no place".to_owned(),
+            n => format!("{n} grains find no places"),
+        };
+        let apart = match region.clearance > 0.0 {
+            true => "with this clearance",
+            false => "without touching",
+        };
+        let message =
+            format!("{who} {apart}; their volume is {percent:.0} % of that of the region");
+        (message, "take fewer or smaller grains, a larger region, less clearance, or another seed")
     })
 }
 

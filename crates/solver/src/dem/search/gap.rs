@@ -51,8 +51,9 @@ pub struct Gap {
 /// Point of the grain's surface with the smallest distance in `field`: descent from the closest
 /// node. None if it is farther than `limit` [m], or where the gradient of the field vanishes.
 fn closest_point(owner: &Grain, field: &PartnerField, limit: f64) -> Option<SurfacePoint> {
+    // Every point of the surface is closer to a node than this.
     let nodes = owner.shape.nodes().len() as f64;
-    let spacing = (owner.shape.surface_area() / nodes).sqrt();
+    let spacing = 2.0 * (owner.shape.surface_area() / nodes).sqrt();
     let (mut least, mut nearest) = (limit + spacing, None);
     for node in owner.shape.nodes() {
         let distance = field.distance_within(node.position, least.max(0.0));
