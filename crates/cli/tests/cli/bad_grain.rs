@@ -156,7 +156,7 @@ fn millimetres_for_metres() {
     );
     let small: Vec<Face> = cube().iter().map(|f| f.map(|p| p.map(|x| 2e-4 * x))).collect();
     refused_mesh(&small, "1 mm", &["of 0.2481", "check the unit of --unit"]);
-    refused_mesh(&small, "-2mm", &["unit = -2", "must be finite and positive"]);
+    refused_mesh(&small, "-2mm", &["unit = -0.002", "must be finite and positive"]);
 }
 
 #[test]
