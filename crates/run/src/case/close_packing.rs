@@ -1,5 +1,8 @@
 //! Random places of grains that lie closer than their bounding spheres allow: random places in a
 //! larger region, which then shrinks to that of the case, while grains that touch move apart.
+//!
+//! Overlaps stay shallow that way. From random places in the region itself the grains hardly come
+//! apart: deep inside a grain the gradient of its distance field does not lead out of the overlap.
 
 use glam::DVec3;
 

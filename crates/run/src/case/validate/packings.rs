@@ -124,7 +124,8 @@ fn random_places(
     })
 }
 
-/// Returns the grains of a packing without their positions, as written and as bodies.
+/// Returns the grains of a packing without their positions: as a case file has them, and as bodies
+/// at the origin.
 fn members(
     check: &mut Checker,
     grains: &mut Grains,

@@ -22,7 +22,7 @@ const ABSURD_STEPS: f64 = 100_000_000.0;
 const ORDINARY_DENSITIES: std::ops::RangeInclusive<f64> = 5.0..=25_000.0;
 /// Settling Reynolds number below which a grain hardly moves, which suggests a wrong unit.
 const ABSURD_REYNOLDS: f64 = 1e-4;
-/// Part of the weight that a body acceleration may leave without a warning.
+/// Part of the weight that a body acceleration may leave unbalanced without a warning.
 const BALANCE_TOLERANCE: f64 = 0.01;
 
 /// Returns all warnings of a case.
