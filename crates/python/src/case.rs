@@ -151,7 +151,7 @@ impl PyCase {
     ///     2 halves the cells in a box that follows the grains; 1 by default.
     /// refinement_margin : float, str or sequence, optional
     ///     Least distance from the grains to the sides of that box [m], one or one per axis; 0.4
-    ///     diameters by default.
+    ///     equivalent diameters by default.
     /// end : float or str
     ///     End of the run [s].
     /// grains : sequence of dict, default ()

@@ -30,6 +30,7 @@ mod schema;
 mod settling;
 mod shapes;
 mod source;
+mod sphere_cells;
 mod suggest;
 mod time_scale;
 mod toml_messages;

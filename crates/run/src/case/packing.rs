@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 use rand::RngExt;
 use std::f64::consts::TAU;
 
+use super::sphere_cells::SphereCells;
 use grainwake_solver::dem::{Enclosure, Grain};
 
 /// Generator of a packing: the reference sequence of SplitMix64 (Steele, Lea and Flood 2014), on
@@ -61,18 +62,13 @@ impl Region {
         (self.upper - self.lower).element_product()
     }
 
-    fn free(&self, sphere: Sphere, others: &[Sphere]) -> bool {
-        self.placed.iter().map(Sphere::around).chain(others.iter().copied()).all(|other| {
-            let mut arm = sphere.centre - other.centre;
-            for axis in 0..3 {
-                if self.enclosure.periodic[axis] {
-                    let period = self.enclosure.size()[axis];
-                    arm[axis] -= period * (arm[axis] / period).round();
-                }
-            }
-            // Neighbours on a full lattice touch, up to rounding.
-            arm.length() >= (sphere.radius + other.radius + self.clearance) * (1.0 - ROUNDING)
-        })
+    /// Cells with the spheres around the placed grains, for further spheres of the given radii [m].
+    fn cells(&self, radii: impl Iterator<Item = f64>) -> SphereCells<'_> {
+        let placed: Vec<Sphere> = self.placed.iter().map(Sphere::around).collect();
+        let largest = radii.chain(placed.iter().map(|sphere| sphere.radius)).fold(0.0, f64::max);
+        let mut cells = SphereCells::new(&self.enclosure, self.clearance, largest);
+        placed.into_iter().for_each(|sphere| cells.insert(sphere));
+        cells
     }
 
     /// Returns the distance of a sphere's centre from the faces of the region along each axis [m];
@@ -90,7 +86,8 @@ impl Region {
 
     /// Returns random centres without overlap of the spheres [m]; none if a sphere finds no place.
     pub fn random(&self, radii: &[f64], random: &mut Random) -> Option<Vec<DVec3>> {
-        let mut placed: Vec<Sphere> = Vec::new();
+        let mut cells = self.cells(radii.iter().copied());
+        let mut centres = Vec::with_capacity(radii.len());
         for &radius in radii {
             let margin = self.margin(radius);
             let room = self.upper - self.lower - 2.0 * margin;
@@ -99,11 +96,13 @@ impl Region {
             }
             let found = (0..20_000).find_map(|_| {
                 let sphere = Sphere { centre: self.lower + margin + room * point(random), radius };
-                self.free(sphere, &placed).then_some(sphere)
+                cells.free(sphere).then_some(sphere)
             });
-            placed.push(found?);
+            let sphere = found?;
+            cells.insert(sphere);
+            centres.push(sphere.centre);
         }
-        Some(placed.iter().map(|sphere| sphere.centre).collect())
+        Some(centres)
     }
 
     /// Returns centres on a cubic lattice [m], filled layer by layer along `up`. Each centre is
@@ -171,7 +170,12 @@ impl Region {
 
     /// Returns whether no sphere overlaps another one or a placed one.
     pub fn clear(&self, spheres: &[Sphere]) -> bool {
-        spheres.iter().enumerate().all(|(i, sphere)| self.free(*sphere, &spheres[..i]))
+        let mut cells = self.cells(spheres.iter().map(|sphere| sphere.radius));
+        spheres.iter().all(|sphere| {
+            let free = cells.free(*sphere);
+            cells.insert(*sphere);
+            free
+        })
     }
 }
 

@@ -59,7 +59,7 @@ pub struct Setup {
     /// them: 1, the default, refines nothing; 2 halves the spacing there.
     pub refinement: usize,
     /// Least distance from the grains to the sides of the refined box along x, y, z [m]. The
-    /// default is 0.4 diameters of their bounding spheres; three cells is the minimum.
+    /// default is 0.4 equivalent diameters; three cells is the minimum.
     pub refinement_margin: Option<DVec3>,
     /// Coupling scheme.
     pub scheme: Scheme,

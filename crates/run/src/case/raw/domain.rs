@@ -21,8 +21,8 @@ pub struct RawDomain {
     pub cell_size: Option<Located<CellSize>>,
     /// Cells along the edge of a cell in a box around the grains, which moves with them: 1 or 2.
     pub refinement: Option<Located<usize>>,
-    /// Least distance from the bounding spheres of the grains to the sides of that box [m]: one
-    /// length, or one for each axis.
+    /// Least distance from the grains to the sides of that box [m]: one length, or one for each
+    /// axis.
     pub refinement_margin: Option<Located<CellSize>>,
     /// Lower corner of the box [m].
     #[serde(default)]
