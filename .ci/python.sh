@@ -35,7 +35,7 @@ python3 -m venv "$work/plain"
 "$work/plain/bin/pip" install -q "$wheel"
 python3 .ci/first_example.py docs/python.md > "$work/first.py"
 (cd "$work" && "$work/plain/bin/python" first.py)
-(cd "$work" && "$work/plain/bin/python" "$root/.ci/import_time.py" 0.3)
+(cd "$work" && "$work/plain/bin/python" "$root/.ci/imports.py")
 
 # 3. Tests, types and notebooks with optional packages.
 python3 -m venv "$work/full"
