@@ -57,6 +57,7 @@ impl<'a> SphereCells<'a> {
         })
     }
 
+    /// Returns whether two spheres keep the clearance, periodic images included.
     fn apart(&self, sphere: Sphere, other: Sphere) -> bool {
         let mut arm = sphere.centre - other.centre;
         for axis in 0..3 {

@@ -146,7 +146,7 @@ mod tests {
             let turned = grain.clone().with_orientation(turn);
             for x in turned.shape.nodes().iter().map(|node| turn * node.position) {
                 let [below, above] = extents(&turned);
-                assert!((x + below).min_element() > -1e-3 && (above - x).min_element() > -1e-3);
+                assert!((x + below).min_element() > -1e-12 && (above - x).min_element() > -1e-12);
             }
             let boundaries = Boundaries([[Boundary::WALL; 2]; 3]);
             box_around(&MESH, &boundaries, &[turned], None, None).unwrap().cells
