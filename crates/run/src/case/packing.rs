@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use rand::RngExt;
 use std::f64::consts::TAU;
 
-use super::sphere_cells::SphereCells;
+use super::sphere_cells::{Sphere, SphereCells};
 use grainwake_solver::dem::{Enclosure, Grain};
 
 /// Generator of a packing: the reference sequence of SplitMix64 (Steele, Lea and Flood 2014), on
@@ -22,24 +22,6 @@ pub(super) fn orientation(random: &mut Random) -> DQuat {
 /// Returns a uniformly distributed point of the unit cube.
 fn point(random: &mut Random) -> DVec3 {
     DVec3::from_array(random.random())
-}
-
-/// Relative depth below which an overlap is a rounding error.
-pub(super) const ROUNDING: f64 = 1e-9;
-
-/// Bounding sphere of a grain.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sphere {
-    /// Centre [m].
-    pub centre: DVec3,
-    /// Radius [m].
-    pub radius: f64,
-}
-
-impl Sphere {
-    fn around(grain: &Grain) -> Sphere {
-        Sphere { centre: grain.pose.position, radius: grain.shape.bounding_radius() }
-    }
 }
 
 /// Part of the box to fill, and the grains in it.

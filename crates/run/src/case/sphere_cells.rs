@@ -5,8 +5,26 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::packing::{ROUNDING, Sphere};
-use grainwake_solver::dem::Enclosure;
+use grainwake_solver::dem::{Enclosure, Grain};
+
+/// Relative depth below which an overlap is a rounding error.
+pub(super) const ROUNDING: f64 = 1e-9;
+
+/// Bounding sphere of a grain.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sphere {
+    /// Centre [m].
+    pub centre: DVec3,
+    /// Radius [m].
+    pub radius: f64,
+}
+
+impl Sphere {
+    /// The sphere around a grain.
+    pub fn around(grain: &Grain) -> Sphere {
+        Sphere { centre: grain.pose.position, radius: grain.shape.bounding_radius() }
+    }
+}
 
 /// Spheres that keep a clearance from each other; each is in the cell of its centre.
 pub(super) struct SphereCells<'a> {
@@ -74,12 +92,12 @@ impl<'a> SphereCells<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::packing::Random;
     use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::SplitMix64;
 
     #[test]
     fn spheres_are_free_as_found_by_comparing_all() {
-        let mut random = Random::seed_from_u64(5);
+        let mut random = SplitMix64::seed_from_u64(5);
         for periodic in [[false; 3], [true, false, true], [true; 3]] {
             // Cells along the axes: one, three and nine.
             let enclosure = Enclosure {

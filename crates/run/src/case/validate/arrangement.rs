@@ -2,9 +2,9 @@
 
 use super::check::Checker;
 use crate::case::located::{Located, Span};
-use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
 use crate::case::raw::RawGrain;
+use crate::case::sphere_cells::ROUNDING;
 use crate::number_format::{AXES, SIDES, length};
 use grainwake_solver::dem::{Enclosure, Grain, Outside, outside};
 use grainwake_solver::flow::{Boundaries, Boundary};

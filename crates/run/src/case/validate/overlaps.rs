@@ -4,8 +4,8 @@ use glam::{DQuat, DVec3};
 
 use super::arrangement::{LISTED, Placement};
 use super::check::Checker;
-use crate::case::packing::ROUNDING;
 use crate::case::placement::extent_along;
+use crate::case::sphere_cells::ROUNDING;
 use crate::number_format::{length, number};
 use grainwake_solver::dem::{
     Enclosure, Grain, Overlap, Partner, RelativeOverlap, initial_overlaps,

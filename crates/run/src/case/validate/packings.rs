@@ -6,11 +6,12 @@ use super::check::{Checker, point_into_box};
 use super::grains::{Grains, not_too_light, shape};
 use crate::case::close_packing::close_places;
 use crate::case::located::Located;
-use crate::case::packing::{Random, Region, Sphere, orientation};
+use crate::case::packing::{Random, Region, orientation};
 use crate::case::quantity::Quantity;
 use crate::case::raw::{
     Arrangement, Bounds, MotionLaw, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
+use crate::case::sphere_cells::Sphere;
 use crate::number_format::vector;
 use grainwake_solver::dem::{Enclosure, Grain};
 use rand::{RngExt, SeedableRng};
