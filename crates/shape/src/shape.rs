@@ -8,7 +8,7 @@ use crate::provenance::Provenance;
 use crate::quality::Quality;
 use crate::surface;
 use crate::triangles::cube_sphere;
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 
 /// Representation of the distance.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,9 +117,36 @@ impl Shape {
     pub fn upper(&self) -> DVec3 {
         self.upper
     }
+    /// Middle and half edges [m] of the box along the axes around the bounding box turned by
+    /// `orientation`; from the centroid.
+    pub fn turned_box(&self, orientation: DQuat) -> [DVec3; 2] {
+        let turn = DMat3::from_quat(orientation);
+        let middle = turn * (0.5 * (self.lower + self.upper));
+        let half = 0.5 * (self.upper - self.lower);
+        let [x, y, z] = [turn.x_axis, turn.y_axis, turn.z_axis].map(DVec3::abs);
+        [middle, x * half.x + y * half.y + z * half.z]
+    }
+    /// Ends of the range of n for which `first` + n `step` lies in the bounding box, extended by
+    /// `margin`; all in the principal frame [m]. The first end is the larger one if there are none.
+    pub fn box_crossing(&self, margin: f64, first: DVec3, step: DVec3) -> [f64; 2] {
+        let ends = [self.lower - margin, self.upper + margin].map(|end| (end - first) / step);
+        [ends[0].min(ends[1]).max_element(), ends[0].max(ends[1]).min_element()]
+    }
     /// Radius of the smallest sphere about the centroid that contains the shape [m].
     pub fn bounding_radius(&self) -> f64 {
         self.bounding_radius
+    }
+    /// Distances [m] along the axes from the centroid to the ends of the shape turned by
+    /// `orientation`, below and above; those of a sampled field are to the outermost surface nodes.
+    pub fn extents(&self, orientation: DQuat) -> [DVec3; 2] {
+        if let Field::Sphere(radius) = self.field {
+            return [DVec3::splat(radius); 2];
+        }
+        let turn = DMat3::from_quat(orientation);
+        self.nodes.iter().fold([DVec3::ZERO; 2], |[below, above], node| {
+            let x = turn * node.position;
+            [below.max(-x), above.max(x)]
+        })
     }
     /// Diameter of the sphere of equal volume [m].
     pub fn equivalent_diameter(&self) -> f64 {
@@ -184,5 +211,35 @@ impl Shape {
     pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
         size("equivalent diameter", diameter)?;
         self.scaled(diameter / self.equivalent_diameter())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ShapeOptions, analytic};
+
+    /// Along a unit vector n, an ellipsoid extends to the length of (a n_1, b n_2, c n_3).
+    #[test]
+    fn a_turned_ellipsoid_has_its_extents() {
+        let semi_axes = DVec3::new(1.2, 0.4, 0.3);
+        let ellipsoid = analytic::ellipsoid(1.2, 0.4, 0.3, &ShapeOptions::default()).unwrap();
+        for n in 0..20 {
+            let axis = DVec3::new(1.0, f64::from(n % 7) - 3.0, 0.3).normalize();
+            let orientation = DQuat::from_axis_angle(axis, 0.2 * f64::from(n));
+            let [below, above] = ellipsoid.extents(orientation);
+            let to_body = DMat3::from_quat(orientation.inverse());
+            for along in 0..3 {
+                let expected = (semi_axes * (to_body * DVec3::AXES[along])).length();
+                for found in [below[along], above[along]] {
+                    assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+                }
+            }
+        }
+        let [from, to] = ellipsoid.box_crossing(0.1, DVec3::X, DVec3::X);
+        assert!((from + 2.3).abs() < 0.02 && (to - 0.3).abs() < 0.02, "{from} {to}");
+        let [from, to] = ellipsoid.box_crossing(0.1, DVec3::Y, DVec3::X);
+        assert!(from > to, "{from} {to}");
+        assert_eq!(Shape::sphere(0.5, 100).extents(DQuat::IDENTITY), [DVec3::splat(0.5); 2]);
     }
 }

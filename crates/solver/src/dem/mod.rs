@@ -24,5 +24,7 @@ pub use grain::{Grain, Material, MotionConstraint};
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };
+pub use search::gap::{
+    Gap, Outside, Overlap, gaps, initial_overlaps, near_pairs, outside, surface_gap, wall_gap,
+};
 pub(crate) use search::{BoundingSphere, BroadPhase, is_sphere};
-pub use search::{Gap, Outside, Overlap, gaps, initial_overlaps, outside, surface_gap, wall_gap};

@@ -8,7 +8,7 @@ use crate::case::placement::extent_along;
 use crate::case::sphere_cells::ROUNDING;
 use crate::number_format::{length, number};
 use grainwake_solver::dem::{
-    Enclosure, Grain, Overlap, Partner, RelativeOverlap, initial_overlaps,
+    Enclosure, Grain, Overlap, Partner, RelativeOverlap, initial_overlaps, near_pairs,
 };
 
 /// Largest overlap that may be one of grains at rest [diameters].
@@ -98,16 +98,14 @@ fn overlaps(grains: &[Grain], enclosure: &Enclosure) -> Vec<Overlap> {
     let mut found = initial_overlaps(grains, enclosure);
     found.retain(|o| o.depth > ROUNDING * grains[o.grain].shape.bounding_radius());
     let solid: Vec<DVec3> = grains.iter().map(solid_point).collect();
-    for (i, a) in grains.iter().enumerate() {
-        for (j, b) in grains.iter().enumerate().skip(i + 1) {
-            let Some(depth) = nested([a, b], [solid[i], solid[j]], enclosure) else {
-                continue;
-            };
-            let partner = Partner::Grain(j);
-            match found.iter_mut().find(|o| o.grain == i && o.partner == partner) {
-                Some(overlap) => overlap.depth = overlap.depth.max(depth),
-                None => found.push(Overlap { grain: i, partner, depth }),
-            }
+    for [i, j] in near_pairs(grains, enclosure) {
+        let Some(depth) = nested([&grains[i], &grains[j]], [solid[i], solid[j]], enclosure) else {
+            continue;
+        };
+        let partner = Partner::Grain(j);
+        match found.iter_mut().find(|o| o.grain == i && o.partner == partner) {
+            Some(overlap) => overlap.depth = overlap.depth.max(depth),
+            None => found.push(Overlap { grain: i, partner, depth }),
         }
     }
     found

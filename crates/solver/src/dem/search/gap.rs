@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::deepest_point::{DescentLimits, minimise_distance};
 use super::surface::{PartnerField, SurfacePoint};
 use super::{BoundingSphere, BroadPhase, shifts};
-use crate::dem::enclosure::{Enclosure, Partner, WallFace};
+use crate::dem::enclosure::{Enclosure, PairKey, Partner, WallFace};
 use crate::dem::grain::Grain;
 
 /// Overlap of two grains, or of a grain and a wall.
@@ -136,16 +136,33 @@ pub fn wall_gap(grain: &Grain, enclosure: &Enclosure) -> Option<(f64, Partner)> 
     gaps.min_by(|x, y| x.0.total_cmp(&y.0))
 }
 
-/// Gaps below `limit` [m] of grains to grains and to images of grains, in ascending order of the
-/// pairs.
-pub fn gaps(grains: &[Grain], enclosure: &Enclosure, limit: f64) -> Vec<Gap> {
+/// Pairs of grains, or of a grain and an image of one, whose bounding spheres have a gap of at most
+/// `limit` [m], in ascending order.
+fn near_images(grains: &[Grain], enclosure: &Enclosure, limit: f64) -> Vec<PairKey> {
     let spheres = grains.iter().map(|grain| BoundingSphere {
         centre: grain.pose.position,
         radius: grain.shape.bounding_radius() + 0.5 * limit,
     });
     let mut broad_phase = BroadPhase::default();
     broad_phase.search(&spheres.collect::<Vec<_>>(), enclosure);
-    let gaps = broad_phase.pairs.par_iter().filter_map(|pair| {
+    broad_phase.pairs
+}
+
+/// Pairs of different grains whose bounding spheres overlap, images included, in ascending order.
+pub fn near_pairs(grains: &[Grain], enclosure: &Enclosure) -> Vec<[usize; 2]> {
+    let pairs = near_images(grains, enclosure, 0.0).into_iter();
+    let mut pairs: Vec<_> = pairs
+        .filter_map(|pair| Some([pair.grain as usize, pair.partner.grain()?]))
+        .filter(|[first, second]| first != second)
+        .collect();
+    pairs.dedup();
+    pairs
+}
+
+/// Gaps below `limit` [m] of grains to grains and to images of grains, in ascending order of the
+/// pairs.
+pub fn gaps(grains: &[Grain], enclosure: &Enclosure, limit: f64) -> Vec<Gap> {
+    let gaps = near_images(grains, enclosure, limit).into_par_iter().filter_map(|pair| {
         let (first, second) = (pair.grain as usize, pair.partner.grain()?);
         let (a, b) = (&grains[first], &grains[second]);
         let image = IVec3::from_array(pair.image).as_dvec3() * enclosure.period();

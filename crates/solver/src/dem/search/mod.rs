@@ -6,7 +6,7 @@
 //! deepest point of a sphere.
 
 mod deepest_point;
-mod gap;
+pub mod gap;
 mod narrow_phase;
 mod patch_layout;
 mod patch_scan;
@@ -14,7 +14,6 @@ mod patch_tree;
 mod patches;
 mod surface;
 
-pub use gap::{Gap, Outside, Overlap, gaps, initial_overlaps, outside, surface_gap, wall_gap};
 pub(super) use narrow_phase::{ContactPatch, ContactPoint};
 pub(super) use patches::{PatchTree, PosedShape};
 pub(crate) use surface::is_sphere;

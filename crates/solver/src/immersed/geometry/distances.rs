@@ -104,9 +104,13 @@ impl FillLists<'_> {
         for j in 0..self.body.size.y {
             let row = h * DVec3::new(0.0, f64::from(j), f64::from(k));
             let lever_arm = corner - self.grain.pose.position + row;
-            let Range { start, end } = indices_in_sphere(lever_arm, h.x, radius, self.body.size.x);
+            let in_body = to_body * lever_arm;
+            let near = indices_in_sphere(lever_arm, h.x, radius, self.body.size.x);
+            let in_box = self.grain.shape.box_crossing(self.locator.reach, in_body, step);
+            let start = (in_box[0].ceil() as i32).clamp(near.start, near.end);
+            let end = (in_box[1].floor() as i32).saturating_add(1).clamp(start, near.end);
             let span = RowSpan { start, end, first: count };
-            let first = (to_body * lever_arm).as_vec3();
+            let first = in_body.as_vec3();
             for i in (start..end).step_by(V::WIDTH) {
                 let index = V::constant(f64::from(i)) + V::ramp();
                 let mut x = [V::constant(0.0); 3];

@@ -20,7 +20,7 @@ pub use sampling::narrow_band_bytes;
 use crate::dem::{BoundingSphere, BroadPhase, Enclosure, Grain, Partner};
 use crate::grid::Mesh;
 use distances::FillLists;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use grainwake_simd::dispatch;
 
 /// Fraction of the size of two grains below which their distances from a face count as equal, since
@@ -124,12 +124,8 @@ impl Locator {
     /// Sets the box of cells around a grain.
     fn set_box(&self, grain: &Grain, body: &mut LocatedBody) {
         let mesh = &self.mesh;
-        let to_space = DMat3::from_quat(grain.pose.orientation);
-        let (lower, upper) = (grain.shape.lower(), grain.shape.upper());
-        let middle = grain.pose.position + to_space * (0.5 * (lower + upper));
-        let half = 0.5 * (upper - lower);
-        let [x, y, z] = [to_space.x_axis, to_space.y_axis, to_space.z_axis].map(DVec3::abs);
-        let span = x * half.x + y * half.y + z * half.z;
+        let [middle, span] = grain.shape.turned_box(grain.pose.orientation);
+        let middle = grain.pose.position + middle;
         for axis in 0..3 {
             let (h, n) = (mesh.spacing[axis], mesh.cells[axis] as i32);
             if n == 1 {
