@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the wheel of the Python package, tests it in clean environments, checks its types and runs
 # the notebooks. Wheel and executed notebooks are kept for .ci/site.sh. Bounds: wheel at most 15 MB,
-# import below 0.3 s of processor time, each notebook below 60 s.
+# each notebook below 60 s.
 # The program is $GRAINWAKE, or built if that is empty.
 set -euo pipefail
 cd "$(dirname "$0")/.."
