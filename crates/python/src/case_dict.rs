@@ -8,6 +8,7 @@ use toml::{Table, Value};
 
 use crate::error::{Raise, input, system};
 use crate::grain::PyGrain;
+use grainwake_run::case::write_toml;
 
 /// Largest number of tables and lists inside each other.
 const DEEPEST: usize = 32;
@@ -41,7 +42,7 @@ pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Strin
 /// Returns the tables as TOML. Grains are written to the folder `store`.
 pub fn to_toml(tables: &Bound<'_, PyDict>, store: &Path) -> PyResult<String> {
     let table = table("", tables.as_mapping(), Some(store))?;
-    toml::to_string(&table).map_err(|error| input(error.to_string()))
+    write_toml(&table).map_err(|error| input(error.to_string()))
 }
 
 fn table(path: &str, mapping: &Bound<'_, PyMapping>, store: Option<&Path>) -> PyResult<Table> {
