@@ -231,6 +231,9 @@ mod tests {
             let axis = DVec3::new(1.0, f64::from(n % 7) - 3.0, 0.3).normalize();
             let orientation = DQuat::from_axis_angle(axis, 0.2 * f64::from(n));
             let [below, above] = ellipsoid.extents(orientation);
+            for x in ellipsoid.nodes().iter().map(|node| orientation * node.position) {
+                assert!((x + below).min_element() > 0.0 && (above - x).min_element() > 0.0);
+            }
             let to_body = DMat3::from_quat(orientation.inverse());
             for along in 0..3 {
                 let expected = (semi_axes * (to_body * DVec3::AXES[along])).length();

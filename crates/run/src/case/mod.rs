@@ -160,7 +160,7 @@ fn write(raw: &RawCase) -> Result<String, CaseError> {
 /// square of the number of grains.
 ///
 /// # Errors
-/// What TOML has no form for.
+/// A value that TOML cannot represent.
 pub fn write_toml(value: &impl Serialize) -> Result<String, toml::ser::Error> {
     let mut buffer = toml::ser::Buffer::new();
     value.serialize(toml::Serializer::new(&mut buffer))?;
