@@ -158,18 +158,26 @@ impl<R: Real> Fourier<R> {
         mut a: &'a mut [Complex<V>],
         mut b: &'a mut [Complex<V>],
     ) -> [&'a mut [Complex<V>]; 2] {
-        if let Some(Chirp { turn, spectrum }) = &self.chirp {
-            for (x, turn) in a.iter_mut().zip(turn) {
-                *x = x.times(*turn);
+        // `fft.run` is inlined once for both rounds of a convolution: a second copy would nearly
+        // double the compile time of this crate.
+        for round in 0..if self.chirp.is_some() { 2 } else { 1 } {
+            match &self.chirp {
+                Some(Chirp { turn, .. }) if round == 0 => {
+                    for (x, turn) in a.iter_mut().zip(turn) {
+                        *x = x.times(*turn);
+                    }
+                    a[turn.len()..].fill(Complex::zero());
+                }
+                // With real and imaginary parts exchanged, a forward transform is an inverse one.
+                Some(Chirp { spectrum, .. }) => {
+                    for (x, factor) in a.iter_mut().zip(spectrum) {
+                        *x = x.times(*factor).swap_parts();
+                    }
+                }
+                None => {}
             }
-            a[turn.len()..].fill(Complex::zero());
             [a, b] = self.fft.run(a, b);
-            // With real and imaginary parts exchanged, a forward transform is an inverse one.
-            for (x, factor) in a.iter_mut().zip(spectrum) {
-                *x = x.times(*factor).swap_parts();
-            }
         }
-        [a, b] = self.fft.run(a, b);
         if let Some(Chirp { turn, .. }) = &self.chirp {
             for (x, turn) in a.iter_mut().zip(turn) {
                 *x = x.swap_parts().times(*turn);
