@@ -54,14 +54,13 @@ def bootstrap(groups, seed=1):
     Models are drawn anew, and numbers of members once for all models.
     """
     random = np.random.default_rng(seed)
-    samples = np.empty(SAMPLES)
-    largest = max(len(group) for group in groups)
-    for i in range(SAMPLES):
-        models = random.integers(len(groups), size=len(groups))
-        at = random.random(largest)
-        drawn = [(at[: len(group)] * len(group)).astype(int) for group in groups]
-        samples[i] = np.mean([groups[m][drawn[m]].mean() for m in models])
-    return samples
+    models = random.integers(len(groups), size=(SAMPLES, len(groups)))
+    at = random.random((SAMPLES, max(len(group) for group in groups)))
+    means = []
+    for group in groups:
+        members = (at[:, : len(group)] * len(group)).astype(int)
+        means.append(group[members].mean(axis=1))
+    return np.take_along_axis(np.stack(means, axis=1), models, axis=1).mean(axis=1)
 
 
 def interval(groups):
