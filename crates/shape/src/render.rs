@@ -205,7 +205,7 @@ impl Picture {
 /// Returns the normal at the point where a ray meets the surface.
 fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> {
     let close = 1e-4 * shape.bounding_radius();
-    // Outside the box a distance costs several times as much, and most rays miss the grain.
+    // Distances outside the box cost more, and many rays miss the grain.
     let [entry, exit] = shape.box_crossing(0.01 * shape.bounding_radius(), from, along);
     let (mut t, reach) = (entry.max(0.0), exit.min(reach));
     for _ in 0..400 {
