@@ -9,7 +9,7 @@ root="$PWD"
 started=$SECONDS
 
 work="$(mktemp -d)"
-trap 'rm -rf "$work"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$work"' EXIT
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 
 if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
@@ -37,27 +37,29 @@ python3 .ci/first_example.py docs/python.md > "$work/first.py"
 (cd "$work" && "$work/plain/bin/python" first.py)
 (cd "$work" && "$work/plain/bin/python" "$root/.ci/imports.py")
 
-# 3. Tests, types and notebooks with optional packages.
+# 3. Tests with optional packages; beside them on another core the types and the statistics of the
+# studies by a second route. Then the notebooks, whose time is bounded.
 python3 -m venv "$work/full"
 "$work/full/bin/pip" install -q "$wheel[all]" pytest mypy pandas-stubs \
-  nbclient ipykernel matplotlib trimesh
+  nbclient ipykernel matplotlib trimesh lifelines
 program="${GRAINWAKE:-}"
 if [ -z "$program" ]; then
   cargo build --release --quiet
   program="${CARGO_TARGET_DIR:-$root/target}/release/grainwake"
 fi
+(
+  cd "$work"
+  full/bin/python -m mypy --config-file "$root/crates/python/pyproject.toml" -p grainwake
+  full/bin/python -m mypy.stubtest grainwake._grainwake \
+    --mypy-config-file "$root/crates/python/pyproject.toml" --allowlist "$root/.ci/stubtest.txt"
+  for study in dkt-morphology-ensemble dkt-morphology-members dkt-real-grains; do
+    full/bin/python "$root/studies/second_route.py" "$root/results/$study" orientation cells
+  done
+) &
+beside=$!
 (cd "$work" && GRAINWAKE_CLI="$program" \
-  "$work/full/bin/python" -m pytest -q -p no:cacheprovider "$root/crates/python/tests")
-(cd "$work" && "$work/full/bin/python" -m mypy --config-file "$root/crates/python/pyproject.toml" \
-  -p grainwake)
-(cd "$work" && "$work/full/bin/python" -m mypy.stubtest grainwake._grainwake \
-  --mypy-config-file "$root/crates/python/pyproject.toml" --allowlist "$root/.ci/stubtest.txt")
-(cd "$work" && "$work/full/bin/python" "$root/.ci/notebooks.py" 60 "$input/notebooks" \
+  full/bin/python -m pytest -q -p no:cacheprovider "$root/crates/python/tests")
+wait "$beside"
+(cd "$work" && full/bin/python "$root/.ci/notebooks.py" 60 "$input/notebooks" \
   "$root"/docs/notebooks/*.ipynb)
-
-# 4. Statistics of the study by a second route.
-"$work/full/bin/pip" install -q lifelines
-for study in dkt-morphology-ensemble dkt-morphology-members dkt-real-grains; do
-  "$work/full/bin/python" studies/second_route.py "results/$study" orientation cells
-done
 echo "python: all checks passed in $((SECONDS - started)) s"

@@ -3,7 +3,7 @@
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
 use crate::number_format::number;
 use grainwake_shape::Field;
-use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain};
+use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain, initial_overlaps};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::Setup;
 
@@ -35,6 +35,10 @@ pub(super) fn long_substeps(setup: &Setup) -> Option<String> {
 /// which the grains settled.
 pub(super) fn start_out_of_balance(setup: &Setup) -> Option<String> {
     let up = -setup.gravity.try_normalize()?;
+    // Most cases begin without contact, and need no patches of the surfaces for this.
+    if initial_overlaps(&setup.grains, &setup.enclosure()).is_empty() {
+        return None;
+    }
     let mut grains = setup.grains.clone();
     let mut contact = vec![Load::default(); grains.len()];
     let mut dynamics = ContactDynamics::new(setup.contact, setup.enclosure());
