@@ -194,8 +194,8 @@ fn immersed_fraction(grain: &Grain, surface: f64) -> f64 {
     below / all
 }
 
-/// Releases a grain of equivalent diameter 1, tilted and out of equilibrium, and checks the immersed
-/// fraction at rest for several ratios of its density to that of the fluid.
+/// Releases a grain of equivalent diameter 1 tilted and out of equilibrium, and checks its immersed
+/// fraction at rest for several ratios of the densities.
 fn floats_as_archimedes_found(name: &str, shape: &Shape) {
     let surface = 3.0;
     for ratio in [0.2, 0.5, 0.8, 0.9] {
