@@ -110,7 +110,7 @@ impl From<CaseError> for Exit {
         match error {
             CaseError::Unreadable { ref source, .. } => {
                 let (code, help) = match source.kind() {
-                    ErrorKind::NotFound => (
+                    ErrorKind::NotFound | ErrorKind::IsADirectory => (
                         BAD_INPUT,
                         "give the path of a case file, for example cases/dkt-pair/quick.toml",
                     ),

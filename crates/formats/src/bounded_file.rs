@@ -35,8 +35,12 @@ pub fn read_bytes(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
 /// Those of [`read_bytes`], and `InvalidData` if the text is not UTF-8.
 pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
     let bytes = read_bytes(path, limit)?;
-    let not_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not a text in UTF-8");
-    String::from_utf8(bytes).map_err(not_text)
+    String::from_utf8(bytes).map_err(|error| {
+        let (at, bytes) = (error.utf8_error().valid_up_to(), error.as_bytes());
+        let line = 1 + bytes[..at].iter().filter(|byte| **byte == b'\n').count();
+        let what = format!("line {line} is not a text in UTF-8 (byte 0x{:02x})", bytes[at]);
+        io::Error::new(io::ErrorKind::InvalidData, what)
+    })
 }
 
 /// Opens a file that ends: a device is refused.

@@ -49,7 +49,7 @@ pub struct RunFeatures {
     pub scales: Option<Scales>,
     /// Unit vector against gravity; +z if gravity is unknown or zero.
     pub up: DVec3,
-    /// Trailing (upper) and leading grain of a pair at the start.
+    /// Trailing and leading grain of a pair at the start; of grains that rise the upper one leads.
     pub pair: Option<[usize; 2]>,
     /// Phases of a pair.
     pub phases: Vec<Phase>,
@@ -80,7 +80,8 @@ impl RunFeatures {
         let diameter = run.facts.diameter().filter(|_| gravity.length() > 0.0);
         let scales = diameter.map(|diameter| Scales { diameter, gravity: gravity.length() });
         let end = run.end();
-        let height = |i: usize| run.grains[i].position[0].dot(up);
+        let back = if rises(run, &moving) { -up } else { up };
+        let height = |i: usize| run.grains[i].position[0].dot(back);
         let pair = match moving[..] {
             [a, b] if height(a) >= height(b) => Some([a, b]),
             [a, b] => Some([b, a]),
@@ -164,6 +165,13 @@ impl RunFeatures {
         };
         format!("{}{landed}", self.time_text(moment.time))
     }
+}
+
+/// Returns whether all of these grains are known to be lighter than the fluid.
+fn rises(run: &RunFolder, grains: &[usize]) -> bool {
+    let ratio =
+        |grain: &usize| Some(run.facts.grains.get(*grain)?.density? / run.facts.fluid_density?);
+    !grains.is_empty() && grains.iter().all(|grain| ratio(grain).is_some_and(|ratio| ratio < 1.0))
 }
 
 /// Returns the time of the smallest gap between the surfaces or, if the gap is unknown, of the

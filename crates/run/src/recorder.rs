@@ -10,6 +10,7 @@ use grainwake_solver::sim::Simulation;
 
 use crate::contact_events::{MAX_GRAINS, WallEvents};
 use crate::error::{Context, RunError};
+use crate::job::Job;
 use crate::plan::RunPlan;
 use crate::run_folder::checkpoint::{self, Record};
 use crate::run_folder::{ExtraTable, Tables, VtkOutput, contact_files, remove_if_there};
@@ -43,17 +44,12 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    fn build(
-        run: &Path,
-        digest: &str,
-        plan: &RunPlan,
-        sim: &Simulation,
-        tables: Tables,
-    ) -> Recorder {
+    fn build(run: &Path, job: &Job, sim: &Simulation, tables: Tables) -> Recorder {
+        let plan = &job.plan;
         let extra = ExtraTable::all(plan);
         let intervals: Vec<f64> = extra.iter().map(ExtraTable::interval).collect();
-        let watch = Watch::new(sim, plan.stop);
-        let mut record = Record::new(digest, sim, watch.tracker.state());
+        let watch = Watch::new(&job.setup, sim, plan.stop);
+        let mut record = Record::new(&job.digest, sim, watch.tracker.state());
         record.last_extra_rows = vec![None; extra.len()];
         Recorder {
             run: run.into(),
@@ -73,14 +69,8 @@ impl Recorder {
     }
 
     /// Starts the record of a run at t = 0 and writes the first outputs.
-    pub fn start(
-        run: &Path,
-        digest: &str,
-        plan: &RunPlan,
-        sim: &Simulation,
-    ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
-        let mut recorder = Recorder::build(run, digest, plan, sim, tables);
+    pub fn start(run: &Path, job: &Job, sim: &Simulation) -> Result<Recorder, RunError> {
+        let mut recorder = Recorder::build(run, job, sim, new_tables(run, &job.plan)?);
         recorder.write_due(sim)?;
         recorder.checkpoint(sim)?;
         Ok(recorder)
@@ -92,13 +82,11 @@ impl Recorder {
     /// divergence, CFL number and overlap are those of the new run.
     pub fn branch(
         run: &Path,
-        digest: &str,
+        job: &Job,
         parent: Record,
-        plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let tables = Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())?;
-        let mut recorder = Recorder::build(run, digest, plan, sim, tables);
+        let mut recorder = Recorder::build(run, job, sim, new_tables(run, &job.plan)?);
         recorder.watch.tracker.restore(parent.tracker);
         recorder.record.contact_events = parent.contact_events;
         if recorder.with_walls {
@@ -133,13 +121,13 @@ impl Recorder {
     /// Continues the record of a run from a checkpoint.
     pub fn resume(
         run: &Path,
+        job: &Job,
         mut record: Record,
-        plan: &RunPlan,
         sim: &Simulation,
     ) -> Result<Recorder, RunError> {
-        let extra = ExtraTable::all(plan);
-        let tables = Tables::reopen(run, &record.lengths, &extra, plan.scales.as_ref())?;
-        let mut recorder = Recorder::build(run, &record.digest, plan, sim, tables);
+        let extra = ExtraTable::all(&job.plan);
+        let tables = Tables::reopen(run, &record.lengths, &extra, job.plan.scales.as_ref())?;
+        let mut recorder = Recorder::build(run, job, sim, tables);
         recorder.watch.tracker.restore(record.tracker.clone());
         for (series, next) in recorder.series.iter_mut().zip(&record.next) {
             series.next = *next;
@@ -360,4 +348,8 @@ impl Recorder {
             grains: grains.collect(),
         }
     }
+}
+
+fn new_tables(run: &Path, plan: &RunPlan) -> Result<Tables, RunError> {
+    Tables::create(run, &ExtraTable::all(plan), plan.scales.as_ref())
 }

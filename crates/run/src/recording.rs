@@ -117,15 +117,14 @@ impl Opened {
         for (name, bytes) in &job.files {
             write(&out.join(name), bytes)?;
         }
-        let summary_path = out.join(summary::FILE);
-        if summary_path.exists() {
-            disk::remove_file(&summary_path).context("remove", &summary_path)?;
+        // The outcome of an earlier session.
+        for file in [summary::FILE, "failure.json"] {
+            remove_if_there(&out.join(file), disk::remove_file)?;
         }
-        let (plan, digest) = (&job.plan, &job.digest);
         let recorder = match begin {
-            Begin::Fresh => Recorder::start(&out, digest, plan, sim)?,
-            Begin::Resumed(record) => Recorder::resume(&out, *record, plan, sim)?,
-            Begin::Branched(record) => Recorder::branch(&out, digest, *record, plan, sim)?,
+            Begin::Fresh => Recorder::start(&out, job, sim)?,
+            Begin::Resumed(record) => Recorder::resume(&out, job, *record, sim)?,
+            Begin::Branched(record) => Recorder::branch(&out, job, *record, sim)?,
         };
         Ok(Recording {
             plan: job.plan.clone(),

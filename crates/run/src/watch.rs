@@ -3,8 +3,8 @@
 use grainwake_formats::events::Event;
 use grainwake_formats::summary::EndReason;
 use grainwake_solver::dem::{Enclosure, surface_gap};
-use grainwake_solver::sim::Simulation;
 use grainwake_solver::sim::events::{EventParams, StopWhen, Tracker};
+use grainwake_solver::sim::{Setup, Simulation};
 
 use crate::plan::Stop;
 
@@ -19,12 +19,13 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Watch of a simulation from its present state on.
-    pub fn new(sim: &Simulation, stop: Option<Stop>) -> Watch {
-        let setup = sim.setup();
-        let enclosure = setup.enclosure();
-        let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
-        let params = EventParams::for_grains(sim.grains(), setup.gravity, fluid_density, enclosure);
+    /// Watch of a simulation from its present state on. `start` is its set-up at t = 0: a grain
+    /// that has left since no longer moves freely, and must not change the settling direction.
+    pub fn new(start: &Setup, sim: &Simulation, stop: Option<Stop>) -> Watch {
+        let enclosure = start.enclosure();
+        let fluid_density = start.fluid.map_or(0.0, |fluid| fluid.density);
+        let params =
+            EventParams::for_grains(&start.grains, start.gravity, fluid_density, enclosure);
         let tracker = Tracker::new(params, sim.grains(), pair_gap(sim, &enclosure));
         Watch { enclosure, tracker, stop, separation_hold: params.separation_hold }
     }

@@ -178,6 +178,21 @@ fn mistyped_keys_and_words_are_corrected() {
 }
 
 #[test]
+fn a_lubrication_gap_must_exceed_the_roughness() {
+    let contact = |line: &str| format!("end = \"1 s\"\n[contact]\n{line}");
+    let words = ["is not above the roughness, 3 um", "lubrication_gap = 0"];
+    let gap = contact("lubrication_gap = \"2 um\"");
+    refused("end = \"1 s\"", &gap, "contact.lubrication_gap", &words);
+    good(&PAIR.replace("end = \"1 s\"", &gap.replace("2 um", "4 um")));
+    let smooth = contact("lubrication_gap = \"2 um\"\nroughness = \"1 um\"");
+    good(&PAIR.replace("end = \"1 s\"", &smooth));
+    // Without grains the default roughness is not known, and the resolved case does without.
+    let flow = PAIR.split("[[grain]]").next().unwrap();
+    let flow = flow.replace("end = \"1 s\"", &contact("lubrication_gap = \"0.1 mm\""));
+    good(&good(&flow).resolved);
+}
+
+#[test]
 fn lengths_and_angles_without_their_unit_are_refused() {
     let contact = |line: &str| format!("end = \"1 s\"\n[contact]\n{line}");
     let end = "end = \"1 s\"";
@@ -416,6 +431,51 @@ fn free_grains_lighter_than_the_coupling_bears_are_refused() {
     let fluid = "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n";
     assert!(PAIR.contains(fluid));
     good(&PAIR.replace(fluid, "").replacen(density, "density = 2", 1));
+}
+
+/// Water through a box 2.5 mm deep, along z, past a fixed cylinder or sphere of 2 mm.
+fn past_a_grain(domain: &str, shape: &str) -> Case {
+    good(&format!(
+        "[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n\
+         [domain]\n{domain}\n\
+         [time]\nend = \"10 ms\"\n\
+         [[grain]]\nshape = {{ kind = \"{shape}\", diameter = \"2 mm\" }}\ndensity = 2000\n\
+         motion = \"fixed\"\nposition = [\"5 mm\", \"1.25 mm\", \"10 mm\"]\n"
+    ))
+}
+
+#[test]
+fn the_resolution_of_a_flat_box_is_that_in_its_plane() {
+    let flat = "cells = [40, 1, 80]\ncell_size = [\"0.25 mm\", \"2.5 mm\", \"0.25 mm\"]\n\
+                boundaries = { x = \"slip\", y = \"periodic\", z = \"slip\" }";
+    let across = past_a_grain(flat, "sphere").estimate(1).cells_per_diameter.unwrap();
+    assert!((across - 8.0).abs() < 1e-9, "{across}");
+}
+
+#[test]
+fn the_speed_of_an_inflow_counts_for_the_resolution() {
+    let through = "size = [\"10 mm\", \"2.5 mm\", \"20 mm\"]\ncell_size = \"0.25 mm\"\n\
+                   boundaries = { x = \"slip\", y = \"slip\", z = [{ kind = \"inflow\", \
+                   velocity = [0, 0, 0.5] }, \"outflow\"] }";
+    let estimate = past_a_grain(through, "sphere").estimate(1);
+    assert!((estimate.start_reynolds.unwrap() - 1000.0).abs() < 1e-6);
+    let warnings = estimate.warnings.join("\n");
+    assert!(warnings.contains("the boundary layer is not resolved"), "{warnings}");
+}
+
+#[test]
+fn refinement_is_not_advised_for_grains_that_float_in_a_free_surface() {
+    let floating = PAIR
+        .replace("\"1500 kg/m3\"", "600")
+        .replace("\"0.25 mm\"", "\"0.5 mm\"\nboundaries = { z = [\"wall\", \"free-surface\"] }");
+    let warnings = |text: &str| good(text).estimate(1).warnings.join("\n");
+    let coarse = warnings(&floating);
+    assert!(
+        coarse.contains("make cell_size smaller") && !coarse.contains("refinement"),
+        "{coarse}"
+    );
+    let refined = warnings(&floating.replace("[domain]", "[domain]\nrefinement = 2"));
+    assert!(refined.contains("floats up to the free surface"), "{refined}");
 }
 
 #[test]

@@ -75,6 +75,41 @@ fn a_grain_of_four_cells_leaves_through_an_outflow_as_if_the_domain_went_on() {
     assert!(sim.grains()[0].has_left());
 }
 
+/// Set-up without gravity of a sphere of density 1.2 that moves at `speed` towards an outflow.
+fn towards_an_outflow(speed: f64) -> Simulation {
+    let grain = sphere(1.2, [2.0, 2.0, 2.0]).with_velocity(DVec3::new(0.0, 0.0, -speed));
+    let start = setup([32, 32, 32], [Boundary::Outflow, Boundary::WALL], 0.02, vec![grain]);
+    Simulation::new(start.with_gravity(DVec3::ZERO)).unwrap()
+}
+
+#[test]
+fn a_grain_that_slows_down_at_an_outflow_is_not_thrown_back() {
+    let mut sim = towards_an_outflow(1.0);
+    while !sim.grains()[0].has_left() {
+        step(&mut sim);
+        let speed = -sim.grains()[0].velocity.z;
+        assert!(sim.grains()[0].has_left() || speed > 0.1, "{speed} at t = {}", sim.time());
+        assert!(sim.time() < 12.0, "it leaves");
+    }
+}
+
+#[test]
+fn a_grain_that_falls_along_an_outflow_reaches_its_settling_speed() {
+    let speed = |x: f64| {
+        let grain = sphere(1.2, [x, 2.0, 6.0]);
+        let mut case = setup([32, 32, 56], WALLS, 0.05, vec![grain]);
+        case.boundaries.0[0][1] = Boundary::Outflow;
+        let mut sim = Simulation::new(case).unwrap();
+        sim.advance_to(15.0).unwrap();
+        -sim.grains()[0].velocity.z
+    };
+    let (middle, beside) = (speed(2.0), speed(3.2));
+    assert!(
+        (beside / middle - 1.0).abs() < 0.1,
+        "{beside} beside the outflow, {middle} far from it"
+    );
+}
+
 #[test]
 fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     let (speed, mut short, mut balance) = at_the_plane(8);

@@ -160,6 +160,16 @@ fn a_length_without_a_unit_is_in_metres() {
 }
 
 #[test]
+fn a_case_is_a_file_in_utf_8() {
+    let folder = tempfile::tempdir().unwrap();
+    let latin = folder.path().join("latin.toml");
+    std::fs::write(&latin, b"title = \"a\"\n[fluid]\nviscosity = \"1 \xb5Pa s\"\n").unwrap();
+    let checked = |path: &std::path::Path| grainwake().arg("check").arg(path).assert().code(2);
+    checked(folder.path()).stderr(contains("give the path of a case file"));
+    checked(&latin).stderr(contains("line 3 is not a text in UTF-8 (byte 0xb5)"));
+}
+
+#[test]
 fn a_report_of_no_run_says_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("notes.txt");

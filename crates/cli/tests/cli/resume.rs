@@ -551,6 +551,76 @@ fn a_run_that_blows_up_keeps_its_last_checkpoint() {
     );
 }
 
+/// The heavy grain leaves through the lower side; the light one rises and touches the upper wall.
+const LEAVES: &str = r#"
+gravity = [0, 0, -9.81]
+
+[domain]
+size = ["8 mm", "8 mm", "12 mm"]
+cell_size = "0.5 mm"
+boundaries = { x = "periodic", y = "periodic", z = ["outflow", "wall"] }
+
+[fluid]
+density = 1000
+viscosity = "5 mPa s"
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = 3000
+position = ["2 mm", "2 mm", "2 mm"]
+velocity = [0, 0, -0.1]
+
+[[grain]]
+shape = { kind = "sphere", diameter = "2 mm" }
+density = 500
+position = ["6 mm", "6 mm", "10 mm"]
+
+[time]
+end = "0.12 s"
+step = "0.5 ms"
+
+[output]
+tables = "5 ms"
+slices = 0
+surfaces = 0
+"#;
+
+#[test]
+fn a_resumed_run_finds_the_same_events_after_a_grain_has_left() {
+    let (folder, case) = folder_with(LEAVES);
+    let (out, whole) = (folder.path().join("run"), folder.path().join("whole"));
+    run(&case, &out, &["--set", "time.end=60 ms"]).success();
+    run(&case, &out, &["--resume"]).success();
+    run(&case, &whole, &[]).success();
+    assert_same_run(&whole, &out);
+    let events = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
+    assert!(events.contains("\"left\""), "{events}");
+    assert!(!events.contains("landing"), "the heavy grain settles downwards: {events}");
+    let table = Table::read(&out.join("grains.csv"), &mut Vec::new()).unwrap();
+    let touches = |column: &str| table.column(column).unwrap().last().copied();
+    assert!(touches("contacts") > Some(0.0), "the light grain lies under the upper wall");
+}
+
+#[test]
+fn a_run_that_finishes_after_a_failure_is_not_shown_as_failed() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.end=10 ms"]).success();
+    std::fs::write(out.join("failure.json"), "{}").unwrap();
+    run(&case, &out, &["--set", "time.end=20 ms", "--resume"]).success();
+    assert!(!out.join("failure.json").exists());
+}
+
+#[test]
+fn no_grain_is_at_rest_when_all_have_left() {
+    let falls = LEAVES.replace("density = 500", "density = 3000").replace("\"10 mm\"", "\"3 mm\"");
+    let (folder, case) = folder_with(&falls.replace("\"wall\"]", "\"outflow\"]"));
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.stop=\"rest\""]).success();
+    let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
+    assert!(summary.contains("\"ended_by\": \"end\""), "{summary}");
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_is_exit_code_4() {
     let (folder, case) = folder_with(DRY);

@@ -228,7 +228,7 @@ impl PySimulation {
             }
         };
         let in_memory = given.plan.stop.filter(|_| recording.is_none());
-        let watch = in_memory.map(|stop| Watch::new(&sim, Some(stop)));
+        let watch = in_memory.map(|stop| Watch::new(&given.setup, &sim, Some(stop)));
         let (views, closed_by) = (Arc::default(), None);
         let failed = None;
         Ok(PySimulation { sim, recording, watch, closed_by, output, case, pool, views, failed })

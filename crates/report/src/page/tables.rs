@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::features::{RunFeatures, galileo, short};
 use crate::html::{label, number_column, properties, table, text_column};
-use crate::run_folder::RunFolder;
+use crate::run_folder::{Facts, RunFolder};
 
 /// Largest number of events in the table.
 const EVENTS: usize = 100;
@@ -87,8 +87,13 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     }
     let cell = facts.cell();
     rows.add("cell edge *h*", cell.map(|h| format!("{} mm", short(1e3 * h))));
-    let resolution = facts.diameter().zip(cell).map(|(d, h)| short(d / h));
-    rows.add("cells per diameter *d*/*h*", resolution);
+    let resolution = facts.diameter().zip(cell).map(|(d, h)| d / h);
+    rows.add("cells per diameter *d*/*h*", resolution.map(short));
+    if let Some(ratio) = facts.refinement {
+        let finer = resolution.map(|n| format!(", {} cells per diameter", short(ratio as f64 * n)));
+        let text = format!("cell edge *h*/{ratio}{}", finer.unwrap_or_default());
+        rows.add("refined box around the grains", text);
+    }
     for (axis, [lower, upper]) in ["x", "y", "z"].iter().zip(facts.boundaries.iter().flatten()) {
         let text = match lower == upper {
             true => literal(lower),
@@ -97,6 +102,7 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
         rows.add(&format!("faces in *{axis}*"), text);
     }
     rows.add("coupling", facts.scheme.as_deref().map(literal));
+    rows.add("contact", contact(run));
     rows.add("simulated time", format!("{} s", short(features.end)));
     let scaled = features.scales.map(|scales| short(features.end / scales.time()));
     rows.add("simulated time *t* √(*g*/*d*)", scaled);
@@ -108,6 +114,27 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let divergence = divergence.map(|d| format!("{} 1/s", short(d)));
     rows.add("largest divergence after projection", divergence);
     rows
+}
+
+/// Returns the contact law and its parameters: "linear, stiffness 100 N/m, friction 0.5".
+fn contact(run: &RunFolder) -> Option<String> {
+    let Facts { contact, contact_law, .. } = &run.facts;
+    let mut parts = vec![contact_law.clone().unwrap_or_else(|| "linear".into())];
+    for (key, name, unit, scale) in [
+        ("stiffness", "stiffness", " N/m", 1.0),
+        ("friction", "friction", "", 1.0),
+        ("wall_friction", "wall friction", "", 1.0),
+        ("restitution", "restitution", "", 1.0),
+        ("lubrication_gap", "lubrication below", " mm", 1e3),
+        ("roughness", "roughness", " mm", 1e3),
+        ("global_damping", "global damping", " 1/s", 1.0),
+    ] {
+        let is_off = |value: f64| value == 0.0 && matches!(unit, " mm" | " 1/s");
+        if let Some(value) = contact.get(key).copied().filter(|value| !is_off(*value)) {
+            parts.push(format!("{name} {}{unit}", short(scale * value)));
+        }
+    }
+    (!contact.is_empty()).then(|| parts.join(", "))
 }
 
 /// Returns the scales of the dimensionless columns of the tables, if they have them.

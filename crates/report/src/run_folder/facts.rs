@@ -1,5 +1,6 @@
 //! Set-up of a run, from `case.resolved.toml` and `summary.json`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
@@ -42,6 +43,12 @@ pub struct Facts {
     pub scheme: Option<String>,
     /// Whether the fields are in single precision.
     pub single_precision: bool,
+    /// Cells of the refined box per cell of the whole one; `None` without a refined box.
+    pub refinement: Option<u64>,
+    /// Contact law; `None` for the linear one.
+    pub contact_law: Option<String>,
+    /// Numbers of `[contact]` by key.
+    pub contact: BTreeMap<String, f64>,
     /// Grains.
     pub grains: Vec<GrainFacts>,
 }
@@ -117,11 +124,20 @@ fn facts_of(case: &Value) -> Facts {
         viscosity: kinematic.or_else(|| Some(dynamic? / density?)),
         scheme: text(case, "/coupling/scheme"),
         single_precision: text(case, "/run/precision").as_deref() == Some("f32"),
+        refinement: case.pointer("/domain/refinement").and_then(Value::as_u64).filter(|n| *n > 1),
+        contact_law: text(case, "/contact/law"),
+        contact: contact_parameters(case),
         grains: case
             .get("grain")
             .and_then(Value::as_array)
             .map_or(Vec::new(), |grains| grains.iter().map(grain_of).collect()),
     }
+}
+
+/// Returns the numbers of `[contact]` by key.
+fn contact_parameters(case: &Value) -> BTreeMap<String, f64> {
+    let table = case.get("contact").and_then(Value::as_object).into_iter().flatten();
+    table.filter_map(|(key, value)| Some((key.clone(), value.as_f64()?))).collect()
 }
 
 fn text(value: &Value, path: &str) -> Option<String> {
@@ -213,6 +229,7 @@ mod tests {
         assert_eq!(facts.cell(), Some(0.00025));
         assert_eq!(facts.diameter(), Some(3e-3));
         assert_eq!(facts.grains[0].shape.as_deref(), Some("a.grain"));
+        assert!(facts.refinement.is_none() && facts.contact.is_empty());
         let faces = facts.boundaries.unwrap();
         assert_eq!(faces[1], ["slip", "slip"]);
         assert_eq!(faces[2], ["wall", "wall (moving)"]);

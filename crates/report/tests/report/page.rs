@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use grainwake_formats::FormatError;
+use grainwake_report::features::RunFeatures;
+use grainwake_report::run_folder::RunFolder;
 use grainwake_report::{ReportError, ReportFiles, render};
 
 use crate::synthetic::{flows, fresh, heap, pair, surfaces};
@@ -91,6 +93,37 @@ fn a_pair_gets_all_its_figures() {
     }
     let images = svg(&rendered, "speed").matches("<image").count();
     assert_eq!(images, 8 + 1, "a row for the plane of each grain, and the colour bar");
+    remove(&folder);
+}
+
+#[test]
+fn the_page_tells_of_the_refined_box_and_the_contact_law() {
+    let folder = fresh::folder("refined");
+    pair::pair(&folder, 0.0, 1e-3);
+    let file = folder.join("case.resolved.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let refined = text.replace("[domain]\n", "[domain]\nrefinement = 2\n")
+        + "[contact]\nstiffness = 649.39\nfriction = 0.5\nlubrication_gap = 2e-4\nglobal_damping = 0.0\n";
+    std::fs::write(&file, refined).unwrap();
+    let page = page(&render(&folder).unwrap());
+    assert!(page.contains("refined box around the grains") && page.contains("/2, "), "{page}");
+    let contact = "linear, stiffness 649 N/m, friction 0.5, lubrication below 0.2 mm";
+    assert!(page.contains(contact) && !page.contains("global damping"));
+    remove(&folder);
+}
+
+#[test]
+fn the_upper_grain_leads_a_pair_that_rises() {
+    let folder = fresh::folder("rising");
+    pair::pair(&folder, 0.0, 1e-3);
+    let pair = || RunFeatures::of(&RunFolder::open(&folder).unwrap()).pair.unwrap();
+    let sinking = pair();
+    for name in ["case.resolved.toml", "summary.json"] {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        std::fs::write(folder.join(name), text.replace("1500.0", "500.0")).unwrap();
+    }
+    let [trailing, leading] = pair();
+    assert_eq!([leading, trailing], sinking);
     remove(&folder);
 }
 

@@ -5,8 +5,10 @@ use super::settling::{settling_reynolds, smallest_diameter, terminal_speed};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
 use crate::run_folder::{checkpoint_bytes, output_bytes};
+use glam::DVec3;
 use grainwake_shape::{Field, available_memory};
 use grainwake_solver::dem::Grain;
+use grainwake_solver::flow::Boundary;
 use grainwake_solver::sim::Setup;
 use grainwake_solver::sim::events::StopWhen;
 
@@ -130,8 +132,8 @@ impl Estimate {
         let coupling_ns = fluid.map_or(0.0, |_| NS_PER_SURFACE_CELL * surface_cells(setup));
         let step_s = seconds(field_bytes * NS_PER_CELL_BYTE + coupling_ns);
         let smallest = smallest_diameter(&setup.grains);
-        let cells_per_diameter = (fluid.is_some() && smallest.is_finite())
-            .then(|| smallest / setup.finest_spacing().max_element());
+        let cells_per_diameter =
+            (fluid.is_some() && smallest.is_finite()).then(|| smallest / largest_edge(setup));
         let reynolds = galileo.map(settling_reynolds);
         let start_reynolds = start_reynolds(setup);
         let mut estimate = Estimate {
@@ -151,7 +153,7 @@ impl Estimate {
             settling_speed_m_per_s: speed,
             cells_per_diameter,
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
-                .then(|| shortest_axis(setup) / setup.finest_spacing().max_element()),
+                .then(|| shortest_axis(setup) / largest_edge(setup)),
             drag_error: None,
             blockage: blockage(setup),
             contact_time_s,
@@ -171,12 +173,25 @@ impl Estimate {
     }
 }
 
+/// Returns the longest edge of the finest cells, along axes with more than one cell [m].
+fn largest_edge(setup: &Setup) -> f64 {
+    let spacing = setup.finest_spacing();
+    let edges = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1).map(|axis| spacing[axis]);
+    edges.reduce(f64::max).unwrap_or(spacing.max_element())
+}
+
 /// Returns the largest Reynolds number of the velocity of a grain relative to the fluid at the
-/// start; none without fluid, and where a formula gives its velocity.
+/// start, or to that of an inflow; none without fluid, and where a formula gives its velocity.
 fn start_reynolds(setup: &Setup) -> Option<f64> {
     let fluid = setup.fluid.filter(|_| setup.prescription.initial_velocity.is_none())?;
+    let inflows = setup.boundaries.0.as_flattened().iter().filter_map(|boundary| match boundary {
+        Boundary::Inflow { velocity } => Some(*velocity),
+        _ => None,
+    });
+    let speeds: Vec<DVec3> = inflows.chain([fluid.initial_velocity]).collect();
     let of = |grain: &Grain| {
-        let speed = grain.velocity.distance(fluid.initial_velocity);
+        let relative = speeds.iter().map(|velocity| grain.velocity.distance(*velocity));
+        let speed = relative.fold(0.0, f64::max);
         speed * grain.shape.equivalent_diameter() / fluid.kinematic_viscosity
     };
     setup.grains.iter().map(of).reduce(f64::max)
@@ -206,10 +221,13 @@ pub fn drag_error_text(error: f64, decimals: usize) -> String {
     if error > 0.3 { "more than 30 %".into() } else { format!("{:.decimals$} %", 100.0 * error) }
 }
 
+/// Largest number of cells per diameter that is advised.
+const MOST_CELLS: u32 = 100_000;
+
 /// Smallest number of cells per diameter, 8 or more, with which the expected error of the drag is
 /// at most `error`.
 pub fn cells_for_drag_error(error: f64, reynolds: f64) -> u32 {
-    (8..1000).find(|n| drag_error(f64::from(*n), reynolds) <= error).unwrap_or(1000)
+    (8..MOST_CELLS).find(|n| drag_error(f64::from(*n), reynolds) <= error).unwrap_or(MOST_CELLS)
 }
 
 /// Returns the shortest principal extent of a grain [m].

@@ -2,21 +2,23 @@
 //! surfaces, from which they emerge.
 //!
 //! - **Leaving.** Close to an open side the hydrodynamic load is no longer that of an unbounded
-//!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load. Once it is
-//!   beyond the side it has left ([`Grain::leave`]).
+//!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load, changed by
+//!   the drag of a sphere when its velocity changes ([`drag_change`]). Once it is beyond the
+//!   side it has left ([`Grain::leave`]).
 //! - **Emerging.** The part beyond a free surface has no buoyancy and displaces no fluid
 //!   (`emerged.rs`). The pressure that acts on the grain is relative to that at the open surface.
 //!
 //! The boundary faces that a grain covers move with it (`flow/open_boundary.rs`).
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{BVec3, DVec3};
 
 use super::emerged::{EmergedPart, Subvolumes};
 use super::rigid_body::PreviousStep;
 use crate::dem::Grain;
-use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace};
+use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, RigidVelocity, multiply6};
 
@@ -34,9 +36,9 @@ pub enum Crossing {
     Inside,
     /// A part of the grain is beyond a free surface.
     Emerged(Box<EmergedPart>),
-    /// The grain is about to leave and moves under its last hydrodynamic load; with its part beyond
-    /// a free surface, if there is one.
-    Departing(Option<Box<EmergedPart>>),
+    /// The grain is about to leave and moves under its last hydrodynamic load; the normals of the
+    /// sides, and its part beyond a free surface, if there is one.
+    Departing(BVec3, Option<Box<EmergedPart>>),
     /// The grain has left the box.
     Left,
 }
@@ -141,7 +143,7 @@ impl OpenSides {
         if grain.has_left() {
             return Crossing::Left;
         }
-        let (mut departing, mut emerged) = (false, None);
+        let (mut departing, mut emerged) = (BVec3::FALSE, None);
         for &(side, boundary) in &self.sides {
             let spacing = self.mesh.spacing[side.axis];
             let margin = MARGIN * spacing;
@@ -167,11 +169,11 @@ impl OpenSides {
             } else if lowest > 0.0 {
                 return Crossing::Left;
             } else {
-                departing |= highest > -margin;
+                departing.set(side.axis, departing.test(side.axis) || highest > -margin);
             }
         }
         match emerged {
-            _ if departing => Crossing::Departing(emerged),
+            _ if departing.any() => Crossing::Departing(departing, emerged),
             Some(part) => Crossing::Emerged(part),
             None => Crossing::Inside,
         }
@@ -272,11 +274,34 @@ impl OpenSides {
     }
 }
 
+/// Change of the load on a grain that departs along `normals` and had the velocity `before` at the
+/// start of the step: that of the drag of the sphere of equal volume in fluid at rest (Schiller and
+/// Naumann 1935; torque of slow rotation). A grain that speeds up towards a side keeps its load:
+/// there the force of its added mass falls while the drag grows.
+pub fn drag_change(
+    grain: &Grain,
+    normals: BVec3,
+    before: RigidVelocity,
+    fluid: &FluidParams,
+) -> Load {
+    let (d, nu) = (grain.shape.equivalent_diameter(), fluid.kinematic_viscosity);
+    let drag = |velocity: DVec3| {
+        let reynolds = velocity.length() * d / nu;
+        3.0 * PI * fluid.density * nu * d * (1.0 + 0.15 * reynolds.powf(0.687)) * velocity
+    };
+    let slows_down = grain.velocity.abs().cmplt(before.linear.abs());
+    let change = drag(before.linear) - drag(grain.velocity);
+    Load {
+        force: DVec3::select(slows_down | !normals, change, DVec3::ZERO),
+        torque: PI * fluid.density * nu * d.powi(3) * (before.angular - grain.angular_velocity),
+    }
+}
+
 impl Crossing {
     /// Part of the grain beyond a free surface.
     fn emerged_part(&self) -> Option<&EmergedPart> {
         match self {
-            Crossing::Emerged(part) | Crossing::Departing(Some(part)) => Some(part),
+            Crossing::Emerged(part) | Crossing::Departing(_, Some(part)) => Some(part),
             _ => None,
         }
     }

@@ -128,9 +128,14 @@ fn last(observation: &Observation) -> f64 {
 
 /// Returns an estimate in which effects that contain a missing event are infinite.
 fn unbounded(estimate: Estimate) -> Estimate {
-    let end = |v: f64| if v.abs() > 1e-3 * LAST { v.signum() * f64::INFINITY } else { v };
+    let end = infinite_if_missing;
     let Estimate { value, low, high, .. } = estimate;
     Estimate { value: end(value), low: end(low), high: end(high), ..estimate }
+}
+
+/// Returns an effect, infinite if it contains a missing event.
+fn infinite_if_missing(value: f64) -> f64 {
+    if value.abs() > 1e-3 * LAST { value.signum() * f64::INFINITY } else { value }
 }
 
 /// Tests an order by the signed ranks of the differences, or `by_rates` of the event: the log-rank
@@ -229,24 +234,27 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     };
     let model = &reference.model;
     let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
-    let relative = |o: &&Observation| match o.censored {
-        true => LAST,
-        false => relative_difference(o.value, reference.value, reference.value),
+    let relative = |o: &&Observation| match (o.censored, reference.censored) {
+        (true, true) => 0.0,
+        (true, false) => LAST,
+        (false, true) => -LAST,
+        (false, false) => relative_difference(o.value, reference.value, reference.value),
     };
     let relative: Vec<f64> = others.iter().map(relative).collect();
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
     let largest = relative.iter().fold(0.0, larger);
     let says = |e: &Estimate| {
         format!(
-            "{name} against {model} ({}): {} ({}, n = {}); largest difference {}",
+            "{name} against {model} ({}{}): {} ({}, n = {}); largest difference {}",
+            if reference.censored { "none before " } else { "" },
             significant(reference.value),
             percent(e.value),
             interval(e, percent),
             e.n,
-            percent(if largest > 1e-3 * LAST { f64::INFINITY } else { largest })
+            percent(infinite_if_missing(largest))
         )
     };
-    let censored = others.iter().filter(|o| o.censored).count();
+    let censored = others.iter().filter(|o| o.censored || reference.censored).count();
     let estimate = signed_rank(&relative).map(unbounded);
     Outcome::new((others.len(), censored), effect, claimed, estimate, says)
 }

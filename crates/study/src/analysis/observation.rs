@@ -1,5 +1,5 @@
-//! Observations of a quantity, one per model, with right-censoring by the landing or the end of the
-//! run.
+//! Observations of a quantity, one per model, with right-censoring by the landing, by a grain that
+//! leaves the box, or by the end of the run.
 
 use std::collections::BTreeMap;
 
@@ -57,8 +57,8 @@ pub fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
 
 /// Returns a quantity of a run and whether it is right-censored.
 ///
-/// The times of events that did not occur are censored at the landing, or at the end of a run in
-/// which no grain lands.
+/// The times of events that did not occur are censored when a grain first lands or leaves the box,
+/// or at the end of the run.
 pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
     if !record.finished() {
         return None;
@@ -68,7 +68,7 @@ pub fn observe(record: &RunRecord, quantity: &str) -> Option<(f64, bool)> {
     }
     let pair = record.pair.as_ref()?;
     let end = || Some(record.end_time_s? / record.up_and_time()?.1);
-    let censored = || Some((pair.landing_time.or_else(end)?, true));
+    let censored = || Some((pair.landing_time.or(pair.left_time).or_else(end)?, true));
     match quantity {
         "kiss_time" => censored(),
         "tumble_time" | "pass_time" | "separation_time" if pair.kiss_time.is_some() => censored(),

@@ -14,6 +14,8 @@ const SAMPLES: usize = 2000;
 const ENUMERATED: usize = 8;
 /// Number of random orders or combinations of signs that replace all of them.
 const RANDOM_ORDERS: usize = 100_000;
+/// Number of differences up to which the signed-rank test counts all combinations of signs.
+const EXACT: usize = 200;
 
 /// Estimate with its 95 % confidence interval and two-sided p value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,7 +85,8 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<Estimate> {
     let r = pearson(&x, &y)?;
     let quantile = Normal::standard().inverse_cdf(0.975);
     let half_width = quantile * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
-    // A perfect correlation has no finite z; the next smaller possible value replaces it.
+    // A perfect correlation has no finite z; the value half way to the next smaller one without
+    // ties replaces it.
     let steps = (n * (n * n - 1)) as f64;
     let z = r.clamp(-1.0 + 6.0 / steps, 1.0 - 6.0 / steps).atanh();
     let (low, high) = ((z - half_width).tanh(), (z + half_width).tanh());
@@ -131,37 +134,75 @@ fn for_all_orders(values: &mut [f64], first: usize, visit: &mut impl FnMut(&[f64
 /// Performs Wilcoxon's signed-rank test of paired differences.
 ///
 /// The value is the Hodges-Lehmann estimate, the median of all Walsh averages (pairwise means).
-/// The p value is exact given the ties. None below six differences, because no interval of fewer
-/// reaches 95 %; none if a difference is not finite.
+/// The p value is exact given the ties; beyond [`EXACT`] differences p value and interval are those
+/// of the normal distribution of the rank sum. None below six differences, because no interval of
+/// fewer reaches 95 %; none if a difference is not finite.
 pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
     let n = differences.len();
     if n < 6 || !differences.iter().all(|d| d.is_finite()) {
         return None;
     }
-    let mut averages: Vec<f64> = Vec::with_capacity(n * (n + 1) / 2);
-    for (i, a) in differences.iter().enumerate() {
-        averages.extend(differences[i..].iter().map(|b| 0.5 * (b + a)));
-    }
-    averages.sort_by(f64::total_cmp);
+    let mut sorted = differences.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let averages = n * (n + 1) / 2;
     let untied: Vec<f64> = (1..=n).map(|i| i as f64).collect();
-    let cut = critical_value(&rank_sum_counts(&untied));
+    let cut = critical_value(&untied);
     let nonzero: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
     let sizes: Vec<f64> = nonzero.iter().map(|d| d.abs()).collect();
     let ranks = ranks(&sizes);
     let positive = nonzero.iter().zip(&ranks).filter(|(d, _)| **d > 0.0);
     let statistic: f64 = positive.map(|(_, rank)| rank).sum();
-    let counts = rank_sum_counts(&ranks);
+    let average = |k| walsh_average(&sorted, k);
+    Some(Estimate {
+        n,
+        value: 0.5 * (average((averages - 1) / 2) + average(averages / 2)),
+        low: average(cut),
+        high: average(averages - 1 - cut),
+        p: rank_sum_p(&ranks, statistic),
+    })
+}
+
+/// Returns the Walsh average with `k` smaller ones, by bisection over the floating-point numbers;
+/// memory for all averages would grow with the square of the number of differences.
+fn walsh_average(sorted: &[f64], k: usize) -> f64 {
+    let is_enough = |value: f64| {
+        let (mut end, mut count) = (sorted.len(), 0);
+        for (i, a) in sorted.iter().enumerate() {
+            while end > i && 0.5 * (sorted[end - 1] + a) > value {
+                end -= 1;
+            }
+            count += end.saturating_sub(i);
+        }
+        count > k
+    };
+    // Integers in the order of the numbers; the mapping is its own inverse.
+    let map = |bits: i64| bits ^ (((bits >> 63) as u64) >> 1) as i64;
+    let key = |value: f64| map(value.to_bits() as i64);
+    let (mut low, mut high) = (key(sorted[0]), key(sorted[sorted.len() - 1]));
+    while low < high {
+        let middle = low.midpoint(high);
+        match is_enough(f64::from_bits(map(middle) as u64)) {
+            true => high = middle,
+            false => low = middle + 1,
+        }
+    }
+    // No negative zero.
+    f64::from_bits(map(high) as u64) + 0.0
+}
+
+/// Returns the two-sided p value of a sum of ranks with random signs.
+fn rank_sum_p(ranks: &[f64], statistic: f64) -> f64 {
+    if ranks.len() > EXACT {
+        let variance: f64 = ranks.iter().map(|rank| 0.25 * rank * rank).sum();
+        let away = (statistic - 0.5 * ranks.iter().sum::<f64>()).abs() - 0.5;
+        return (2.0 * Normal::standard().cdf(-away / variance.sqrt())).min(1.0);
+    }
+    let counts = rank_sum_counts(ranks);
     let at = (2.0 * statistic).round() as usize;
     let total: f64 = counts.iter().sum();
     let lower: f64 = counts[..=at.min(counts.len() - 1)].iter().sum::<f64>() / total;
     let upper: f64 = counts[at.min(counts.len())..].iter().sum::<f64>() / total;
-    Some(Estimate {
-        n,
-        value: median(&averages)?,
-        low: averages[cut],
-        high: averages[averages.len() - 1 - cut],
-        p: (2.0 * lower.min(upper)).min(1.0),
-    })
+    (2.0 * lower.min(upper)).min(1.0)
 }
 
 /// Returns the two-sided p value of the sum of values whose signs are random: the share of the
@@ -203,8 +244,15 @@ fn rank_sum_counts(ranks: &[f64]) -> Vec<f64> {
     counts
 }
 
-/// Number of Walsh averages outside the 95 % interval at each end: the tabulated critical value.
-fn critical_value(counts: &[f64]) -> usize {
+/// Number of Walsh averages outside the 95 % interval at each end: the tabulated critical value of
+/// the ranks 1 to n.
+fn critical_value(ranks: &[f64]) -> usize {
+    if ranks.len() > EXACT {
+        let deviation = ranks.iter().map(|rank| 0.25 * rank * rank).sum::<f64>().sqrt();
+        let quantile = Normal::standard().inverse_cdf(0.025);
+        return (0.5 * ranks.iter().sum::<f64>() + quantile * deviation - 0.5) as usize;
+    }
+    let counts = rank_sum_counts(ranks);
     let total: f64 = counts.iter().sum();
     let mut sum = 0.0;
     let mut cut = 0;

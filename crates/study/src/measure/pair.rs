@@ -1,8 +1,8 @@
 //! Measured values of a settling pair.
 //!
 //! Lengths are in equivalent diameters d, times in sqrt(d/g), speeds in sqrt(d g), down positive.
-//! *Leading* is the lower grain at the start, *trailing* the upper one. All values end with the
-//! first landing of a grain.
+//! *Leading* is the lower grain at the start, *trailing* the upper one; of grains that rise the
+//! upper one leads. All values end when a grain first lands or leaves the box.
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::{Event, EventKind};
@@ -31,6 +31,9 @@ pub struct PairMeasures {
     pub separation_time: Option<f64>,
     /// First landing.
     pub landing_time: Option<f64>,
+    /// End of the observation, if a grain leaves the box before any lands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_time: Option<f64>,
     /// Number of contacts after a separation, and the first one.
     pub kisses: Option<f64>,
     /// Whether the pair came into contact more than once.
@@ -94,8 +97,8 @@ impl PairMeasures {
             oblong,
             periods: run.periods(),
         });
-        let landing = measures.landing_time.map(|t| t * scales.time());
-        let gap = closest_gap(run, landing.unwrap_or(f64::INFINITY));
+        let end = measures.landing_time.or(measures.left_time).map(|t| t * scales.time());
+        let gap = closest_gap(run, end.unwrap_or(f64::INFINITY));
         measures.closest_gap = gap.map(|gap| gap / scales.diameter);
         Some(measures)
     }
@@ -105,8 +108,10 @@ impl PairMeasures {
         let ends = pair.grains.iter().filter_map(|h| h.time.last());
         let end = ends.fold(f64::INFINITY, |a, b| a.min(*b));
         let landing = pair.first(EventKind::Landing, 0.0);
-        let until = landing.unwrap_or(end);
+        let left = pair.first(EventKind::Left, 0.0);
+        let until = [landing, left].into_iter().flatten().reduce(f64::min).unwrap_or(end);
         let before = |time: &f64| *time <= until;
+        let landing = landing.filter(before);
         let count = |kind: EventKind| {
             let counted = pair.events.iter().filter(|e| e.kind == kind && e.time <= until);
             Some(counted.count() as f64)
@@ -135,6 +140,7 @@ impl PairMeasures {
             pass_time: scaled(pass),
             separation_time: scaled(separation),
             landing_time: scaled(landing),
+            left_time: scaled(left.filter(|_| landing.is_none())),
             repeated: kisses.map(|n| n > 1.0),
             kisses,
             role_changes: count(EventKind::RoleChange),
@@ -198,12 +204,12 @@ impl PairHistory<'_> {
         (to > from).then(|| fallen / (to - from) / self.scales.velocity())
     }
 
-    /// Largest settling speed up to a time [sqrt(d g)].
+    /// Settling speed of the largest magnitude up to a time [sqrt(d g)].
     fn peak_speed(&self, grain: usize, until: f64) -> Option<f64> {
         let h = self.grains[grain];
         let rows = h.time.partition_point(|t| *t <= until);
         let speed = |v: &DVec3| -v.dot(self.up) / self.scales.velocity();
-        h.velocity[..rows].iter().map(speed).reduce(f64::max)
+        h.velocity[..rows].iter().map(speed).max_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
     /// Mean angle of the long axis (x of the body) with the vertical between two times [deg].

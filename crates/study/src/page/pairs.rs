@@ -65,9 +65,14 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
 
 fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation]) -> Markup {
     let spread = |list: &[Observation]| {
-        let varied = list.iter().filter(|o| o.range.1 > o.range.0);
-        let relative: Vec<f64> = varied.map(|o| (o.range.1 - o.range.0) / o.value).collect();
-        median(&relative).map_or("unknown".into(), percent)
+        let has_all = |o: &&Observation| {
+            o.durations.len() > 1 && o.durations.iter().all(|duration| !duration.censored)
+        };
+        let of_all = list.iter().filter(has_all);
+        let relative: Vec<f64> = of_all.map(|o| (o.range.1 - o.range.0) / o.value).collect();
+        let range = median(&relative).map_or("unknown".into(), percent);
+        let models = if relative.len() == 1 { "model" } else { "models" };
+        format!("{range} (median of {} {models})", relative.len())
     };
     html! {
         @if content.without_ensemble() {
@@ -76,10 +81,10 @@ fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation])
              their effect. Claims and correlations are tested by ranks over all models, so no \
              single run decides them."
         } @else {
-            "models were repeated with small random offsets of the initial position. The range of \
-             the repetitions relative to their median is " (spread(kiss)) " for the first contact \
-             and " (spread(contact)) " for the time in contact (medians over the models). Smaller \
-             differences between single models are not significant."
+            "models were repeated with small changes of their start. The range of the repetitions, \
+             of models in which the event occurs in all of them, is " (spread(kiss)) " of their \
+             median for the first contact and " (spread(contact)) " for the time in contact. \
+             Smaller differences between single models are not significant."
         }
     }
 }

@@ -118,7 +118,7 @@ fn uncertainty(content: &Content) -> Markup {
              offsets shows the sensitivity to the initial position, a finer mesh the \
              discretisation error."
         } @else {
-            "models were repeated with small random offsets of the initial position; bars in the \
+            "models were repeated with small changes of their start; bars in the \
              figures are the ranges of the repetitions."
         }
     }

@@ -32,7 +32,7 @@ pub struct Study {
 pub struct Ensemble {
     /// Runs of each model; the first one has no offset.
     pub members: usize,
-    /// Radius of the disc normal to gravity from which offsets are drawn uniformly [m].
+    /// Radius of the disc across the axis of gravity from which offsets are drawn uniformly [m].
     pub offset: f64,
     /// Largest rotation about each axis of the space frame, drawn uniformly up to it [rad].
     pub turn: f64,

@@ -9,8 +9,9 @@ use super::expand::Model;
 use super::file::{Ensemble, Study};
 use crate::error::StudyError;
 
-/// Returns the overrides of an ensemble member: one grain is moved normal to gravity and turned
-/// about the three axes of the space frame; if asked for, all grains are moved by a part of a cell.
+/// Returns the overrides of an ensemble member: one grain is moved along the two axes across
+/// gravity and turned about the three axes of the space frame; if asked for, all grains are moved
+/// by a part of a cell. For a tilted gravity the axis nearest to it counts.
 ///
 /// # Errors
 /// If the case has no grain of that index, or grains that have no position in the case file.

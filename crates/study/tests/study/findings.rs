@@ -412,6 +412,29 @@ fn equal_values_of_zero_are_equal() {
 }
 
 #[test]
+fn a_reference_without_the_event_is_last() {
+    let missed = || PairMeasures { landing_time: Some(60.0), ..PairMeasures::default() };
+    let near = "quantity = \"kiss_time\"\ntest.near = { model = \"sphere\", within = 0.05 }";
+    // Nothing kisses: all are equal.
+    let (found, says) = verdict(&rows(|_, _, _| missed()), near);
+    assert!(found == "holds" && says.contains("none before 60"), "{found}: {says}");
+    // All kiss but the reference.
+    let mut all = rows(|_, _, _| kiss(60.0));
+    let sphere = all.iter_mut().find(|row| row.model == "sphere").unwrap();
+    sphere.pair = Some(missed());
+    let (found, says) = verdict(&all, near);
+    assert!(found == "contradicted" && says.contains("−∞"), "{found}: {says}");
+}
+
+#[test]
+fn a_pair_that_leaves_the_box_is_no_longer_observed() {
+    let mut all = rows(|_, _, _| PairMeasures { left_time: Some(7.0), ..PairMeasures::default() });
+    all.iter_mut().for_each(|row| row.end_time_s = Some(0.5));
+    let found = observations(&all, "kiss_time", &BTreeMap::new());
+    assert!(found.iter().all(|o| o.censored && o.value == 7.0));
+}
+
+#[test]
 fn runs_that_end_in_the_water_are_censored_at_their_end() {
     let mut rows = rows(|_, _, _| PairMeasures::default());
     for row in &mut rows {

@@ -160,3 +160,32 @@ fn distances_are_those_of_the_nearest_periodic_images() {
     assert!((closest([None; 3]) - 9e-3).abs() < 1e-12);
     assert!((closest([Some(10e-3), None, None]) - 1e-3).abs() < 1e-12);
 }
+
+#[test]
+fn the_observation_ends_when_a_grain_leaves() {
+    let t = (2e-3_f64 / 8.0).sqrt();
+    let m = measures(
+        &[(0.1, EventKind::RoleChange), (0.3, EventKind::Left), (0.4, EventKind::Landing)],
+        true,
+    );
+    assert_eq!((m.landing_time, m.role_changes), (None, Some(1.0)));
+    assert!((m.left_time.unwrap() - 0.3 / t).abs() < 1e-9);
+    let m = measures(&[(0.3, EventKind::Landing), (0.4, EventKind::Left)], true);
+    assert!((m.landing_time.unwrap() - 0.3 / t).abs() < 1e-9 && m.left_time.is_none());
+}
+
+#[test]
+fn the_peak_speed_of_grains_that_rise_is_negative() {
+    let rising =
+        |from: f64| history(move |t| DVec3::Z * (from + 0.1 * t * t), |_| DQuat::IDENTITY, 1.0);
+    let m = PairMeasures::from_history(&PairHistory {
+        grains: [&rising(0.0), &rising(0.01)],
+        up: DVec3::Z,
+        scales: SCALES,
+        events: &[],
+        periods: [None; 3],
+        oblong: false,
+    });
+    let v = (2e-3_f64 * 8.0).sqrt();
+    assert!((m.peak_speed_leading.unwrap() + 0.2 / v).abs() < 1e-3, "{:?}", m.peak_speed_leading);
+}

@@ -81,6 +81,27 @@ fn signed_ranks_of_known_samples() {
 }
 
 #[test]
+fn many_differences_have_the_normal_limit() {
+    // wilcoxon(d, method="approx", correction=True) of SciPy 1.16, and the sorted pairwise means.
+    let d: Vec<f64> =
+        (1..=1100).map(|i| (f64::from(i) * 0.618_033_988_749_894_9) % 1.0 - 0.48).collect();
+    let found = signed_rank(&d).unwrap();
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+    near(found.p, 0.020_571_446_577_368_25);
+    near(found.value, 0.020_366_568_717_950_617);
+    near(found.low, 0.003_145_641_843_620_428);
+    near(found.high, 0.037_954_064_310_202_984);
+    // Exact and approximate values follow each other.
+    let [exact, approximate] = [200, 201].map(|n| {
+        let rising: Vec<f64> = (0..n).map(|i| (f64::from(i) / f64::from(n)) - 0.46).collect();
+        signed_rank(&rising).unwrap()
+    });
+    assert!((exact.p - approximate.p).abs() < 0.003, "{} {}", exact.p, approximate.p);
+    assert!((exact.low - approximate.low).abs() < 0.002, "{exact:?} {approximate:?}");
+    assert!(signed_rank(&[0.0; 300]).unwrap().p == 1.0);
+}
+
+#[test]
 fn intervals_have_the_nominal_coverage() {
     // Differences distributed about 0.3: about 95 of 100 intervals contain it.
     let mut state = 1u64;

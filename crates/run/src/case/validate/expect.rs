@@ -34,7 +34,7 @@ fn expected<K: Kind>(
     let key = format!("expect.{measure}");
     if !raw.0.is_empty() && measure.of_pair() && grains != 2 {
         let message = format!("this is a result of a pair, but there are {grains} grains");
-        check.fail_key(&key, message, "leave it out, or use two grains");
+        check.fail(&raw.0[0].span, message, "leave it out, or use two grains");
     }
     let mut all = Vec::new();
     for item in &raw.0 {

@@ -165,6 +165,16 @@ pub(super) fn contact(
             check.fail(&given.span, message, help);
         }
     }
+    if let (Some(gap), Some(roughness)) = (lubrication_gap, roughness)
+        && gap > 0.0
+        && gap <= roughness
+    {
+        let (given, least) = (length(gap), length(roughness));
+        let message = format!("the lubrication gap of {given} is not above the roughness, {least}");
+        let help = "films thinner than the roughness do not resist: make lubrication_gap larger or \
+                    roughness smaller, or set lubrication_gap = 0";
+        check.fail(&raw.lubrication_gap.span, message, help);
+    }
     let law = raw.law.value;
     let for_overlap = |overlap| stiffness_for(overlap, grains, fluid, gravity, mesh);
     let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
@@ -199,7 +209,7 @@ pub(super) fn contact(
     };
     raw.maximum_overlap = None;
     raw.overlap_limit = Some(Quantity::new(params.overlap_limit).into());
-    if params.lubrication_gap > 0.0 {
+    if params.lubrication_gap > 0.0 && params.roughness.is_finite() {
         raw.roughness = Some(Quantity::new(params.roughness).into());
     }
     if law == ContactLawKind::Linear {

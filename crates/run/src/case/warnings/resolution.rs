@@ -7,6 +7,7 @@ use crate::case::settling::{is_free, prescribed_speeds, time_step};
 use crate::case::time_scale::resolved_step;
 use crate::number_format::{AXES, quantity};
 use grainwake_solver::dem::{ContactLawKind, Grain};
+use grainwake_solver::flow::Boundary;
 use grainwake_solver::immersed::Scheme;
 use grainwake_solver::math::{Precision, largest_prime_factor};
 use grainwake_solver::sim::{Setup, StepRule};
@@ -84,6 +85,7 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
             100.0 * f64::from(f32::EPSILON) / 2.0 * e.steps as f64
         ));
     }
+    found.extend(refined_surface(setup));
     found.extend(contact_cost(setup, e));
     found.extend(first_step(setup));
     found.extend(unresolved_formulas(setup, e));
@@ -107,11 +109,26 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     found
 }
 
+/// Refined box that a floating grain will take to a free surface, where the run stops.
+fn refined_surface(setup: &Setup) -> Option<String> {
+    (setup.refinement > 1 && floats_up(setup)).then(|| {
+        "a grain that is lighter than the fluid floats up to the free surface, where the grid cannot be refined and the run stops: leave out [domain] refinement, and make cell_size smaller".into()
+    })
+}
+
+/// Whether a grain lighter than the fluid moves freely in a box with a free surface.
+fn floats_up(setup: &Setup) -> bool {
+    let has_surface = setup.boundaries.0.as_flattened().contains(&Boundary::FreeSurface);
+    let density = setup.fluid.map_or(0.0, |fluid| fluid.density);
+    has_surface && setup.grains.iter().any(|grain| is_free(grain) && grain.density < density)
+}
+
 /// Advice to resolve the grains better.
 fn finer_grid(setup: &Setup) -> &'static str {
     let can_refine = setup.refinement == 1
         && setup.scheme == Scheme::Aperture
-        && setup.mesh.cells.iter().all(|n| *n > 1);
+        && setup.mesh.cells.iter().all(|n| *n > 1)
+        && !floats_up(setup);
     if can_refine {
         "make cell_size smaller, or set refinement = 2 in [domain], which halves the cells around the grains"
     } else {

@@ -103,11 +103,13 @@ impl Tracker {
                 supported[other] = true;
             }
         }
-        let mut free = grains.iter().zip(supported).filter(|(grain, _)| may_settle(grain));
-        let still = free.all(|(grain, supported)| {
-            let spin = grain.angular_velocity.length() * grain.shape.bounding_radius();
-            supported && grain.velocity.length() + spin < self.params.rest_speed
-        });
+        let free = grains.iter().zip(supported).filter(|(grain, _)| may_settle(grain));
+        let mut free = free.peekable();
+        let still = free.peek().is_some()
+            && free.all(|(grain, supported)| {
+                let spin = grain.angular_velocity.length() * grain.shape.bounding_radius();
+                supported && grain.velocity.length() + spin < self.params.rest_speed
+            });
         self.state.still_since = if still { self.state.still_since.or(Some(time)) } else { None };
     }
 

@@ -28,6 +28,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     if end == 0.0 {
         return None;
     }
+    // The last step must not lie under the frame.
+    let end = 1.03 * end;
     let names: Vec<String> = unique(shown.iter().map(|l| &l.level));
     let grids: Vec<String> = unique(shown.iter().filter_map(|l| l.grid.as_ref()));
     let panels = grids.len().max(1);
@@ -60,7 +62,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             let n = names.iter().position(|name| *name == level.level).unwrap_or(0);
             let style = LineStyle::nth(n);
             let clip = format!("clip-share-{panel}-{}", level.level);
-            frame.curve(&mut drawing, &steps(level), style.colour, style.dash, &clip);
+            frame.curve(&mut drawing, &steps(level, end), style.colour, style.dash, &clip);
         }
         let last_row = panel + across >= panels;
         frame.outline(&mut drawing, Labelled { across: last_row, up: column == 0 });
@@ -68,20 +70,20 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let runs: usize = shown.iter().map(|l| l.runs).sum();
     let caption = format!(
         "Share of the pairs that have come into contact by time *t* (cumulative incidence), the \
-         mean over the models of {runs} runs. Pairs that land first never count. A curve ends at \
-         the last landing."
+         mean over the models of {runs} runs. Pairs that land first never count. A curve below 1 \
+         ends at the last contact or landing."
     );
     Some(Figure::new("kissing-share", "Share of the pairs that have kissed", caption, drawing))
 }
 
-/// Points of the step curve of a level, to its last observation.
-fn steps(level: &Level) -> Vec<(f64, f64)> {
+/// Points of the step curve of a level, to its last observation, or to `end` if all have kissed.
+fn steps(level: &Level, end: f64) -> Vec<(f64, f64)> {
     let mut points = vec![(0.0, 0.0)];
     let mut share = 0.0;
     for &(time, next) in &level.incidence {
         points.extend([(time, share), (time, next)]);
         share = next;
     }
-    points.push((level.last, share));
+    points.push((if share > 1.0 - 1e-9 { end } else { level.last }, share));
     points
 }

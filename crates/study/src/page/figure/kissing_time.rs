@@ -188,8 +188,8 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     caption += &match data.records.iter().map(|r| r.member).max() {
         None | Some(0) => " Each symbol is one run.".to_owned(),
         Some(members) => format!(
-            " Symbols are medians and bars the range of up to {} runs with small random offsets \
-             of the initial position.",
+            " Symbols are medians and bars the range of up to {} runs with small changes of their \
+             start.",
             members + 1
         ),
     };
