@@ -597,8 +597,8 @@ fn a_resumed_run_finds_the_same_events_after_a_grain_has_left() {
     assert!(events.contains("\"left\""), "{events}");
     assert!(!events.contains("landing"), "the heavy grain settles downwards: {events}");
     let table = Table::read(&out.join("grains.csv"), &mut Vec::new()).unwrap();
-    let touches = |column: &str| table.column(column).unwrap().last().copied();
-    assert!(touches("contacts") > Some(0.0), "the light grain lies under the upper wall");
+    let touches = table.column("contacts").unwrap().iter().any(|contacts| *contacts > 0.0);
+    assert!(touches, "the light grain touches the upper wall");
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn the_page_tells_of_the_refined_box_and_the_contact_law() {
     std::fs::write(&file, refined).unwrap();
     let page = page(&render(&folder).unwrap());
     assert!(page.contains("refined box around the grains") && page.contains("/2, "), "{page}");
-    let contact = "linear, stiffness 649 N/m, friction 0.5, lubrication below 0.2 mm";
+    let contact = "linear, stiffness 649 N/m, friction 0.500, lubrication below 0.200 mm";
     assert!(page.contains(contact) && !page.contains("global damping"));
     remove(&folder);
 }

@@ -168,6 +168,7 @@ pub(super) fn contact(
     if let (Some(gap), Some(roughness)) = (lubrication_gap, roughness)
         && gap > 0.0
         && gap <= roughness
+        && roughness.is_finite()
     {
         let (given, least) = (length(gap), length(roughness));
         let message = format!("the lubrication gap of {given} is not above the roughness, {least}");
