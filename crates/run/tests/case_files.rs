@@ -461,6 +461,10 @@ fn the_speed_of_an_inflow_counts_for_the_resolution() {
     assert!((estimate.start_reynolds.unwrap() - 1000.0).abs() < 1e-6);
     let warnings = estimate.warnings.join("\n");
     assert!(warnings.contains("the boundary layer is not resolved"), "{warnings}");
+    // The surface of a sphere of 2 mm that spins at 1000 rad/s moves at 1 m/s.
+    let spun = "density = \"1500 kg/m3\"\nangular_velocity = [0, 0, 1000]";
+    let spinning = good(&PAIR.replace("density = \"1500 kg/m3\"", spun)).estimate(1);
+    assert!((spinning.start_reynolds.unwrap() - 2000.0).abs() < 1e-6);
 }
 
 #[test]

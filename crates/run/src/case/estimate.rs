@@ -57,7 +57,8 @@ pub struct Estimate {
     pub galileo_grain: Option<usize>,
     /// Settling Reynolds number of the equal-volume sphere at that Galileo number.
     pub reynolds: Option<f64>,
-    /// Largest Reynolds number of the velocity of a grain relative to the fluid at the start.
+    /// Largest Reynolds number of a grain at the start: of its motion relative to the fluid or to an
+    /// inflow, or of its spin.
     pub start_reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
     pub settling_speed_m_per_s: Option<f64>,
@@ -176,12 +177,13 @@ impl Estimate {
 /// Returns the longest edge of the finest cells, along axes with more than one cell [m].
 fn largest_edge(setup: &Setup) -> f64 {
     let spacing = setup.finest_spacing();
-    let edges = (0..3).filter(|axis| setup.mesh.cells[*axis] > 1).map(|axis| spacing[axis]);
+    let edges = (0..3).filter(|axis| setup.mesh.is_resolved(*axis)).map(|axis| spacing[axis]);
     edges.reduce(f64::max).unwrap_or(spacing.max_element())
 }
 
-/// Returns the largest Reynolds number of the velocity of a grain relative to the fluid at the
-/// start, or to that of an inflow; none without fluid, and where a formula gives its velocity.
+/// Returns the largest Reynolds number of a grain at the start, with the larger of two speeds: that
+/// relative to the fluid or to an inflow, and that of its surface by its spin; none without fluid,
+/// and where a formula gives the velocity of the fluid.
 fn start_reynolds(setup: &Setup) -> Option<f64> {
     let fluid = setup.fluid.filter(|_| setup.prescription.initial_velocity.is_none())?;
     let inflows = setup.boundaries.0.as_flattened().iter().filter_map(|boundary| match boundary {
@@ -191,8 +193,9 @@ fn start_reynolds(setup: &Setup) -> Option<f64> {
     let speeds: Vec<DVec3> = inflows.chain([fluid.initial_velocity]).collect();
     let of = |grain: &Grain| {
         let relative = speeds.iter().map(|velocity| grain.velocity.distance(*velocity));
-        let speed = relative.fold(0.0, f64::max);
-        speed * grain.shape.equivalent_diameter() / fluid.kinematic_viscosity
+        let diameter = grain.shape.equivalent_diameter();
+        let speed = relative.fold(0.5 * diameter * grain.angular_velocity.length(), f64::max);
+        speed * diameter / fluid.kinematic_viscosity
     };
     setup.grains.iter().map(of).reduce(f64::max)
 }
