@@ -57,8 +57,8 @@ pub struct Estimate {
     pub galileo_grain: Option<usize>,
     /// Settling Reynolds number of the equal-volume sphere at that Galileo number.
     pub reynolds: Option<f64>,
-    /// Largest Reynolds number of a grain at the start: of its motion relative to the fluid or to an
-    /// inflow, or of its spin.
+    /// Largest Reynolds number of a grain at the start: of its motion relative to the fluid or to
+    /// an inflow, or of its spin.
     pub start_reynolds: Option<f64>,
     /// Settling speed of that sphere [m/s].
     pub settling_speed_m_per_s: Option<f64>,
