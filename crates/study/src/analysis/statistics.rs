@@ -180,7 +180,7 @@ fn walsh_average(sorted: &[f64], k: usize) -> f64 {
     let key = |value: f64| map(value.to_bits() as i64);
     let (mut low, mut high) = (key(sorted[0]), key(sorted[sorted.len() - 1]));
     while low < high {
-        let middle = low.midpoint(high);
+        let middle = (i128::from(low) + i128::from(high)).div_euclid(2) as i64;
         match is_enough(f64::from_bits(map(middle) as u64)) {
             true => high = middle,
             false => low = middle + 1,
