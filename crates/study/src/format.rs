@@ -44,6 +44,14 @@ pub fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value).replace('-', "−")
 }
 
+/// Start of a sentence about pairs without an event: "1 pair landed, or its run ended, before".
+pub fn missed(pairs: usize) -> String {
+    match pairs {
+        1 => "1 pair landed, or its run ended, before".to_owned(),
+        n => format!("{n} pairs landed, or their runs ended, before"),
+    }
+}
+
 /// Probability with four decimals, as in "0.0152" and "< 0.0001".
 pub fn p_value(p: f64) -> String {
     if p < 1e-4 { "< 0.0001".into() } else { format!("{p:.4}") }

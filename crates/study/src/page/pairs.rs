@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::{Content, paragraph};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::median;
-use crate::format::{percent, significant};
+use crate::format::{missed, percent, significant};
 use crate::measure::pair::PairMeasures;
 use crate::measure::record::RunRecord;
 
@@ -57,7 +57,7 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
             } @else {
                 b { "Shortest " (what) } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."
-                @if censored > 0 { " " (censored) " pairs landed, or their run ended, before (right-censored)." }
+                @if censored > 0 { " " (missed(censored)) " (right-censored)." }
             }
         }
     }
@@ -70,9 +70,11 @@ fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation])
         };
         let of_all = list.iter().filter(has_all);
         let relative: Vec<f64> = of_all.map(|o| (o.range.1 - o.range.0) / o.value).collect();
-        let range = median(&relative).map_or("unknown".into(), percent);
+        let Some(range) = median(&relative).map(percent) else {
+            return "unknown".to_owned();
+        };
         let models = if relative.len() == 1 { "model" } else { "models" };
-        format!("{range} (median of {} {models})", relative.len())
+        format!("{range} of their median ({} {models})", relative.len())
     };
     html! {
         @if content.without_ensemble() {
@@ -82,9 +84,9 @@ fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation])
              single run decides them."
         } @else {
             "models were repeated with small changes of their start. The range of the repetitions, \
-             of models in which the event occurs in all of them, is " (spread(kiss)) " of their \
-             median for the first contact and " (spread(contact)) " for the time in contact. \
-             Smaller differences between single models are not significant."
+             of models in which the event occurs in all of them, is " (spread(kiss)) " for the \
+             first contact and " (spread(contact)) " for the time in contact. Smaller differences \
+             between single models are not significant."
         }
     }
 }

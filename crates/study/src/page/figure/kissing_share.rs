@@ -51,7 +51,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             width,
             height: HEIGHT,
             across: Axis::linear("*t* √(*g*/*d*)  [–]", 0.0, end, 6, AxisRange::Tight),
-            up: Axis::linear("share that has kissed  [–]", 0.0, 1.0, 5, AxisRange::Tight),
+            up: Axis::linear("share that has kissed  [–]", 0.0, 1.02, 5, AxisRange::Tight),
         };
         frame.grid(&mut drawing);
         if let Some(grid) = grids.get(panel) {

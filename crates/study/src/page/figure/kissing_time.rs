@@ -13,7 +13,7 @@ use super::data::FigureData;
 use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
-use crate::format::{significant, title};
+use crate::format::{missed, significant, title};
 
 const SHADES: [&str; 2] = ["#e9e9ec", "#f6f6f8"];
 const LABEL: &str = "kissing time  *t* √(*g*/*d*)  [–]";
@@ -194,7 +194,7 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
         ),
     };
     if censored > 0 {
-        caption += &format!(" {censored} pairs landed, or their run ended, before they kissed.");
+        caption += &format!(" {} the kiss.", missed(censored));
     }
     let title = "Kissing time of all models";
     Some(Figure::new("fig14a-kissing-time", title, caption, drawing).numbered("14a"))
