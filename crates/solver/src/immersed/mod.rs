@@ -45,7 +45,7 @@ mod update;
 
 pub use geometry::narrow_band_bytes;
 pub use initial::Start;
-pub(crate) use open_sides::{Crossing, OpenSides, drag_change};
+pub(crate) use open_sides::{Crossing, OpenSides, departing_load};
 pub(crate) use rigid_body::PreviousStep;
 pub(crate) use schedule::{CoupledGrains, RigidityInput};
 pub(crate) use update::CouplingInput;

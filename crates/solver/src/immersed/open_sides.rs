@@ -2,9 +2,9 @@
 //! surfaces, from which they emerge.
 //!
 //! - **Leaving.** Close to an open side the hydrodynamic load is no longer that of an unbounded
-//!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load, changed by
-//!   the drag of a sphere when its velocity changes ([`drag_change`]). Once it is beyond the
-//!   side it has left ([`Grain::leave`]).
+//!   fluid. From [`MARGIN`] cells before the side on, a grain moves under its last load, which
+//!   changes with its velocity ([`departing_load`]). Once it is beyond the side it has left
+//!   ([`Grain::leave`]).
 //! - **Emerging.** The part beyond a free surface has no buoyancy and displaces no fluid
 //!   (`emerged.rs`). The pressure that acts on the grain is relative to that at the open surface.
 //!
@@ -274,11 +274,14 @@ impl OpenSides {
     }
 }
 
-/// Change of the load on a grain that departs along `normals` and had the velocity `before` at the
-/// start of the step: that of the drag of the sphere of equal volume in fluid at rest (Schiller and
-/// Naumann 1935; torque of slow rotation). A grain that speeds up towards a side keeps its load:
-/// there the force of its added mass falls while the drag grows.
-pub fn drag_change(
+/// Load at the end of a step on a grain that departs along `normals`, from the `load` during the
+/// step and the velocity `before` it.
+///
+/// The load changes with the velocity as the drag of the sphere of equal volume in fluid at rest
+/// (Schiller and Naumann 1935; torque of slow rotation). Towards a side a load against the motion
+/// only decreases, at most to zero: it stops the grain, and does not drive it back.
+pub fn departing_load(
+    load: Load,
     grain: &Grain,
     normals: BVec3,
     before: RigidVelocity,
@@ -289,11 +292,16 @@ pub fn drag_change(
         let reynolds = velocity.length() * d / nu;
         3.0 * PI * fluid.density * nu * d * (1.0 + 0.15 * reynolds.powf(0.687)) * velocity
     };
+    let changed = load.force + drag(before.linear) - drag(grain.velocity);
     let slows_down = grain.velocity.abs().cmplt(before.linear.abs());
-    let change = drag(before.linear) - drag(grain.velocity);
+    let is_against = (load.force * before.linear).cmplt(DVec3::ZERO);
+    let reversed = (load.force * changed).cmplt(DVec3::ZERO);
+    let reduced = DVec3::select(reversed, DVec3::ZERO, changed);
+    let along_normal = DVec3::select(slows_down & is_against, reduced, load.force);
+    let change = before.angular - grain.angular_velocity;
     Load {
-        force: DVec3::select(slows_down | !normals, change, DVec3::ZERO),
-        torque: PI * fluid.density * nu * d.powi(3) * (before.angular - grain.angular_velocity),
+        force: DVec3::select(normals, along_normal, changed),
+        torque: load.torque + PI * fluid.density * nu * d.powi(3) * change,
     }
 }
 

@@ -7,7 +7,7 @@ use super::fluid::Fluid;
 use super::{Setup, Simulation, StepData};
 use crate::dem::{ContactDynamics, Grain, MotionConstraint, RigidState, TrialStep};
 use crate::immersed::{
-    CoupledGrains, CouplingInput, Crossing, PreviousStep, RigidityInput, Scheme, drag_change,
+    CoupledGrains, CouplingInput, Crossing, PreviousStep, RigidityInput, Scheme, departing_load,
 };
 use crate::math::{Load, RigidVelocity, timed};
 
@@ -259,10 +259,8 @@ impl Projected<'_> {
             previous.change = change.linear;
             let touched = !data.contact[i].is_zero();
             let crossing = data.open_sides.as_ref().map(|o| &o.crossings()[i]);
-            if let (Some(Crossing::Departing(normals, _)), Some(fluid), false) =
-                (crossing, &setup.fluid, touched)
-            {
-                *load += drag_change(grain, *normals, previous.velocity, fluid);
+            if let (Some(Crossing::Departing(normals, _)), Some(fluid)) = (crossing, &setup.fluid) {
+                *load = departing_load(*load, grain, *normals, previous.velocity, fluid);
             }
             // The acceleration of an impact does not continue in the next step; its added mass
             // does.

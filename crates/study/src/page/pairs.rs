@@ -74,7 +74,7 @@ fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation])
             return "unknown".to_owned();
         };
         let models = if relative.len() == 1 { "model" } else { "models" };
-        format!("{range} of their median ({} {models})", relative.len())
+        format!("{range} of the time (median of {} {models})", relative.len())
     };
     html! {
         @if content.without_ensemble() {
@@ -83,10 +83,10 @@ fn uncertainty(content: &Content, kiss: &[Observation], contact: &[Observation])
              their effect. Claims and correlations are tested by ranks over all models, so no \
              single run decides them."
         } @else {
-            "models were repeated with small changes of their start. The range of the repetitions, \
-             of models in which the event occurs in all of them, is " (spread(kiss)) " for the \
-             first contact and " (spread(contact)) " for the time in contact. Smaller differences \
-             between single models are not significant."
+            "models were repeated with small changes of their start. The range over the \
+             repetitions is " (spread(kiss)) " for the first contact and " (spread(contact)) " for \
+             the time in contact. It counts models in which the event occurs in every repetition. \
+             Smaller differences between single models are not significant."
         }
     }
 }

@@ -109,14 +109,14 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     found
 }
 
-/// Refined box that a floating grain will take to a free surface, where the run stops.
+/// Refined box around a grain that floats up to a free surface, where the run stops.
 fn refined_surface(setup: &Setup) -> Option<String> {
     (setup.refinement > 1 && floats_up(setup)).then(|| {
         "a grain that is lighter than the fluid floats up to the free surface, where the grid cannot be refined and the run stops: leave out [domain] refinement, and make cell_size smaller".into()
     })
 }
 
-/// Whether a grain lighter than the fluid moves freely in a box with a free surface.
+/// Returns whether a free grain is lighter than the fluid, and the box has a free surface.
 fn floats_up(setup: &Setup) -> bool {
     let has_surface = setup.boundaries.0.as_flattened().contains(&Boundary::FreeSurface);
     let density = setup.fluid.map_or(0.0, |fluid| fluid.density);
