@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 command -v npm >/dev/null || { apt-get update -q && apt-get install -qy nodejs npm; }
 export CHROMIUM="${CHROMIUM:-$(command -v chromium || true)}"
 if [ -z "$CHROMIUM" ]; then
-  apt-get update -q && apt-get install -qy chromium
+  apt-get update -q && apt-get install -qy --no-install-recommends chromium
   CHROMIUM="$(command -v chromium)"
 fi
 

@@ -8,8 +8,7 @@ pub fn resolve(threads: usize) -> usize {
     grainwake_run::threads::resolve(threads, warn)
 }
 
-/// Returns the number of simultaneous runs of a study and the threads of each; warns if they are
-/// reduced.
+/// Returns the number of simultaneous runs and the threads of each; warns if they are reduced.
 pub fn share(jobs: usize, threads: usize) -> (usize, usize) {
     grainwake_run::threads::share(jobs, threads, warn)
 }

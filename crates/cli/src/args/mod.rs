@@ -185,7 +185,10 @@ pub struct ValidateArgs {
     /// List the validations and their runs, without running any
     #[arg(long)]
     pub list: bool,
-    /// Number of threads, 0 for all cores
+    /// Number of concurrent runs
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub jobs: usize,
+    /// Number of threads of each run, 0 to share all cores among the jobs
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
     /// Print the table, warnings and errors only

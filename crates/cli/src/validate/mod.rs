@@ -1,25 +1,26 @@
 //! `grainwake validate`.
 
 mod pictures;
+mod runs;
 mod saved;
 mod table;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::Case;
 use grainwake_run::provenance::Provenance;
-use grainwake_run::{Ending, Existing, Options, RunError};
 use grainwake_validation::{Level, Library, Suite, SuiteError, SuiteRun};
+use runs::ChosenRun;
 use table::{line, table};
 
 use crate::args::ValidateArgs;
-use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, MISSED};
-use crate::progress::{self, clock};
-use crate::{print, signals, tell, threads};
+use crate::exit::{BAD_INPUT, Exit, IO, MISSED};
+use crate::progress::clock;
+use crate::{print, signals, tell};
 
 impl From<SuiteError> for Exit {
     fn from(error: SuiteError) -> Exit {
@@ -59,25 +60,31 @@ pub fn validate(args: &ValidateArgs) -> Result<(), Exit> {
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());
     let started = std::time::Instant::now();
-    let mut results = Vec::new();
+    let mut chosen = Vec::new();
     for suite in &suites {
-        let mut known = BTreeMap::new();
         for run in suite.runs.iter().filter(|run| run.level <= level) {
             let folder = args.output.join(&suite.name).join(&run.name);
-            if args.judge && !is_finished(run, &folder)? {
-                continue;
+            if !args.judge || is_finished(run, &folder)? {
+                chosen.push(ChosenRun { suite, run, folder });
             }
-            let ending =
-                if args.judge { Ok(()) } else { execute(args, suite, run, &folder, stop.clone())? };
-            let found = match ending {
-                Ok(()) => suite.evaluate(run, &folder, &mut known),
-                Err(why) => suite.results_of_failed_run(run, &why),
-            };
-            if !args.quiet {
-                found.iter().for_each(|v| tell!("  {}", line(v)));
-            }
-            results.extend(found);
         }
+    }
+    let (mut results, mut known) = (Vec::new(), BTreeMap::new());
+    let mut evaluate = |ChosenRun { suite, run, folder }: &ChosenRun,
+                        ending: Result<(), String>| {
+        let found = match ending {
+            Ok(()) => suite.evaluate(run, folder, known.entry(suite.name.clone()).or_default()),
+            Err(why) => suite.results_of_failed_run(run, &why),
+        };
+        if !args.quiet {
+            found.iter().for_each(|v| tell!("  {}", line(v)));
+        }
+        results.extend(found);
+    };
+    if args.judge {
+        chosen.iter().for_each(|run| evaluate(run, Ok(())));
+    } else {
+        runs::execute(args, &chosen, &stop, evaluate)?;
     }
     if args.judge && results.is_empty() {
         return Err(Exit::refused(
@@ -129,38 +136,6 @@ fn is_finished(run: &SuiteRun, folder: &Path) -> Result<bool, Exit> {
         return Ok(false);
     }
     Ok(true)
-}
-
-/// Executes one run. The outer error ends the command, the inner one only this run.
-fn execute(
-    args: &ValidateArgs,
-    suite: &Suite,
-    run: &SuiteRun,
-    folder: &Path,
-    stop: Arc<AtomicBool>,
-) -> Result<Result<(), String>, Exit> {
-    let case = Case::load(&run.case, &run.set)?;
-    let threads = threads::resolve(args.threads);
-    if !args.quiet {
-        let cells = case.setup.mesh.cells;
-        tell!("{}/{}: {} x {} x {} cells", suite.name, run.name, cells[0], cells[1], cells[2]);
-    }
-    let existing = if args.resume { Existing::Reuse } else { Existing::Replace };
-    let command = std::env::args().collect();
-    let options = Options { existing, command, threads, ..Options::default() };
-    match progress::run(case.job(), folder, &options, args.quiet, stop.clone())? {
-        Ok(Ending::Interrupted(_)) => Err(Exit::with_help(
-            INTERRUPTED,
-            "interrupted; a checkpoint was written",
-            "continue with the same command and --resume",
-        )),
-        Ok(_) if stop.load(Ordering::Relaxed) => {
-            Err(Exit::new(INTERRUPTED, "interrupted between two runs"))
-        }
-        Ok(_) => Ok(Ok(())),
-        Err(error @ RunError::Unstable { .. }) => Ok(Err(error.to_string())),
-        Err(error) => Err(error.into()),
-    }
 }
 
 /// Returns the suites with their runs and quantities as JSON. The names are stable.

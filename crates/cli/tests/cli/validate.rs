@@ -105,6 +105,23 @@ fn what_holds_is_said_and_json_has_the_stable_names() {
 }
 
 #[test]
+fn concurrent_runs_are_evaluated_in_the_order_of_the_suite() {
+    // The first run, to which the second one refers, ends last.
+    let text = SUITE.replacen("name = \"fall\"", "name = \"fall\"\nset = [\"time.step=1e-5\"]", 1);
+    let (folder, _) = suites(&text);
+    let results = |jobs| {
+        let options = ["--level", "full", "--json", "--threads", "1", "--jobs", jobs];
+        let done = validate(folder.path(), &options).success();
+        String::from_utf8(done.get_output().stdout.clone()).unwrap()
+    };
+    let both = results("2");
+    assert!(both.find("\"fall\"") < both.find("\"slow\""), "{both}");
+    assert_eq!(both, results("1"));
+    let wrong = ["--level", "full", "--jobs", "2", "--set", "gravitas=1"];
+    validate(folder.path(), &wrong).code(2).stderr(contains("gravitas"));
+}
+
+#[test]
 fn a_value_can_be_changed_in_every_case() {
     let (folder, _) = suites(SUITE);
     let moon = ["--set", "gravity=[0,0,-1.62]"];

@@ -12,7 +12,7 @@
 //! same flux on both grids. Momentum is conserved up to the difference of the two grids in the
 //! stresses on these sides (`docs/decisions/0027-refined-box.md`).
 
-use super::nesting::{Nesting, RATIO, RefinedBox};
+use super::nesting::{Nesting, RefinedBox};
 use super::{Flow, FlowMeasures, FluidParams};
 use crate::math::Real;
 use crate::poisson::PoissonTimes;
@@ -61,37 +61,35 @@ impl<R: Real> NestedFlow<R> {
         let whole = &self.whole;
         let nesting = Nesting::new(&whole.mesh, &whole.boundaries, place);
         let (mesh, boundaries) = (place.mesh(&whole.mesh), nesting.boundaries(&whole.boundaries));
-        let (mut reused, mut old) = (None, None);
-        if let Some(Refined { flow, nesting: of_old }) = self.refined.take() {
-            old = Some((of_old, flow.state().0.map(<[R]>::to_vec)));
+        // A box of the same size keeps its memory and its Poisson solver.
+        let (mut reused, mut replaced, mut of_old) = (None, None, None);
+        if let Some(Refined { flow, nesting: of_flow }) = self.refined.take() {
             if flow.mesh.cells == mesh.cells && flow.boundaries == boundaries {
-                // A box of the same size keeps its Poisson solver.
                 reused = Some(Flow { mesh, ..flow });
             } else {
                 self.past_times = self.past_times + flow.poisson_times();
+                replaced = Some(flow);
             }
+            of_old = Some(of_flow);
         }
         let mut flow = reused.unwrap_or_else(|| Flow::new(&mesh, boundaries, &self.params));
         let last_step = whole.previous_step.unwrap_or(0.0);
         let ((from, _), (to, _)) = (whole.state(), flow.state_mut(last_step));
+        let mut copy = Vec::new();
         for (field, (from, to)) in from.into_iter().zip(to).enumerate() {
             let (is_velocity, component) = (field < 3, (field < 6).then_some(field % 3));
-            // The tendency is not known on the sides.
-            let kept = |at| {
-                let (of_old, fields) = old.as_ref()?;
-                Some(fields[field][of_old.common_entry(&nesting, component, is_velocity, at)?])
+            let old_values = match &replaced {
+                Some(flow) => flow.state().0[field],
+                None => {
+                    copy.clear();
+                    copy.extend_from_slice(to);
+                    &copy
+                }
             };
-            let interpolated = nesting.interpolated(component, from);
-            nesting.for_entries(component, to, |at, value| {
-                let new = |old: R| if is_velocity { old } else { interpolated(at) };
-                *value = kept(at).unwrap_or_else(|| new(*value));
-            });
+            let old = of_old.as_ref().map(|of_old| (of_old, old_values));
+            nesting.transfer(component, old, (!is_velocity).then_some(from), to);
         }
-        let is_new = |c: [usize; 3]| {
-            let at = c.map(|c| RATIO * c + 1);
-            let common = |of_old: &Nesting| of_old.common_entry(&nesting, None, false, at);
-            old.as_ref().and_then(|(of_old, _)| common(of_old)).is_none()
-        };
+        let is_new = nesting.new_cells(of_old.as_ref());
         nesting.prolong_velocity(&whole.velocity, &mut flow.velocity, is_new);
         flow.fill_ghosts();
         flow.fill_pressure_ghosts();

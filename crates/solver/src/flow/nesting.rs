@@ -112,34 +112,29 @@ impl Nesting {
         &self.positions[axis][1..=self.place.cells[axis]]
     }
 
-    /// Entry of this refined grid at the position `at` of another refined grid in the same box;
-    /// none outside it. A component on faces includes those on the sides if `with_sides` is set.
-    pub fn common_entry(
+    /// Positions on this refined grid along `axis` by the positions on another refined grid in the
+    /// same box; none outside it. Those of faces along the axis include the sides if `with_sides`
+    /// is set.
+    pub fn common_positions(
         &self,
         other: &Nesting,
-        component: Option<usize>,
+        axis: usize,
+        on_faces: bool,
         with_sides: bool,
-        at: [usize; 3],
-    ) -> Option<usize> {
-        let mut here = [0; 3];
-        for axis in 0..3 {
-            let shift = other.place.corner[axis] - self.place.corner[axis];
-            let mut index = at[axis] as isize + RATIO as isize * shift;
-            let n = self.refined.cells[axis] as isize;
-            if self.periodic[axis] {
-                let period = (RATIO * self.whole.cells[axis]) as isize;
-                index = 1 + (index - 1).rem_euclid(period);
-            }
-            let range = match (component == Some(axis) && !self.spanned[axis], with_sides) {
-                (true, true) => 1..=n + 1,
-                (true, false) => 2..=n,
-                (false, _) => 1..=n,
-            };
-            if !range.contains(&index) {
-                return None;
-            }
-            here[axis] = index as usize;
-        }
-        Some(self.refined.index(here[0], here[1], here[2]))
+    ) -> Vec<Option<usize>> {
+        let shift = RATIO as isize * (other.place.corner[axis] - self.place.corner[axis]);
+        let n = self.refined.cells[axis] as isize;
+        let range = match (on_faces && !self.spanned[axis], with_sides) {
+            (true, true) => 1..=n + 1,
+            (true, false) => 2..=n,
+            (false, _) => 1..=n,
+        };
+        let period = (RATIO * self.whole.cells[axis]) as isize;
+        let here = |at: usize| {
+            let at = at as isize + shift;
+            let at = if self.periodic[axis] { 1 + (at - 1).rem_euclid(period) } else { at };
+            range.contains(&at).then_some(at as usize)
+        };
+        (0..other.refined.cells[axis] + 2).map(here).collect()
     }
 }

@@ -61,29 +61,63 @@ impl Nesting {
         pairs.map(extrapolate).collect()
     }
 
-    /// Calls `f(at, value)` for the entries of a refined field, in parallel; `component` is that of
-    /// a field on faces, which includes the upper side.
-    pub fn for_entries<R: Real>(
+    /// Sets a refined field: to the values of an old refined box where that overlaps this one,
+    /// elsewhere by linear interpolation of `from` on the whole grid. Without `from` the other
+    /// values stay, and those on the sides of the old box count as known. `component` is that of a
+    /// field on faces, which includes the upper side.
+    pub fn transfer<R: Real>(
         &self,
         component: Option<usize>,
-        field: &mut [R],
-        f: impl Fn([usize; 3], &mut R) + Sync,
+        old: Option<(&Nesting, &[R])>,
+        from: Option<&[R]>,
+        to: &mut [R],
     ) {
         let layout = self.refined;
         let last = [0, 1, 2].map(|axis| layout.cells[axis] + usize::from(component == Some(axis)));
-        let planes = field.par_chunks_exact_mut(layout.plane()).enumerate();
+        let interpolated = from.map(|from| self.interpolated(component, from));
+        let old = old.map(|(old, values)| {
+            let common = |axis| {
+                let on_faces = component == Some(axis);
+                old.common_positions(self, axis, on_faces, from.is_none())
+            };
+            (old.refined, values, [0, 1, 2].map(common))
+        });
+        let planes = to.par_chunks_exact_mut(layout.plane()).enumerate();
         planes.filter(|(k, _)| (1..=last[2]).contains(k)).for_each(|(k, plane)| {
             for j in 1..=last[1] {
+                let old_row = old.as_ref().and_then(|(layout, values, [at_x, at_y, at_z])| {
+                    let start = layout.index(0, at_y[j]?, at_z[k]?);
+                    Some((&values[start..][..layout.row()], at_x))
+                });
                 let row = &mut plane[j * layout.row()..][..=last[0]];
-                row.iter_mut().enumerate().skip(1).for_each(|(i, value)| f([i, j, k], value));
+                for (i, value) in row.iter_mut().enumerate().skip(1) {
+                    if let Some(kept) = old_row.and_then(|(old, at_x)| Some(old[at_x[i]?])) {
+                        *value = kept;
+                    } else if let Some(interpolated) = &interpolated {
+                        *value = interpolated([i, j, k]);
+                    }
+                }
             }
         });
+    }
+
+    /// Whether each cell of the whole grid inside this refined box, counted from 0 at its lower
+    /// corner, was outside an old one.
+    pub fn new_cells(&self, old: Option<&Nesting>) -> impl Fn([usize; 3]) -> bool + use<> {
+        let common =
+            old.map(|old| [0, 1, 2].map(|axis| old.common_positions(self, axis, false, false)));
+        move |c| {
+            let is_common = |at: &[Vec<Option<usize>>; 3]| {
+                (0..3).all(|axis| at[axis][RATIO * c[axis] + 1].is_some())
+            };
+            !common.as_ref().is_some_and(is_common)
+        }
     }
 
     /// Value at each entry of a refined field by linear interpolation. At walls and open sides of
     /// the whole box the nearest values inside are extrapolated, because the tendency has no ghosts
     /// and the pressure has no slope there.
-    pub fn interpolated<R: Real>(
+    fn interpolated<R: Real>(
         &self,
         component: Option<usize>,
         from: &[R],

@@ -19,7 +19,7 @@
 //! the force balances f. Therefore the velocity is prescribed beyond a distance from the surface.
 //! The size of the error depends on that distance, so that the tests check its order only.
 
-use super::prescribed::PrescribedGrain;
+use super::prescribed::{CentredValues, PrescribedGrain};
 use super::*;
 
 /// Radius R of the sphere.
@@ -148,14 +148,17 @@ fn force_error(delta: f64, cells: usize, path: DVec3) -> f64 {
     let steps = 2 * (0.5 * TIME * rate).ceil() as usize;
     let dt = TIME / steps as f64;
     let (part, mut sum) = (1.0 - (-dt / RELAXATION).exp(), 0.0);
+    let mut prescribed = CentredValues::new(|axis, x: DVec3| {
+        let part = if x.length() > RADIUS + NEAR { part } else { 0.0 };
+        [solution.driving(x)[axis], part, solution.velocity(x)[axis]]
+    });
     for n in 0..steps {
         let centre = start + (n as f64 + 0.5) * dt * carried;
-        run.step(dt, |axis, x, _, u| {
-            let x = x - centre;
-            *u += dt * solution.driving(x)[axis];
-            if x.length() > RADIUS + NEAR {
-                *u += part * (carried[axis] + solution.velocity(x)[axis] - *u);
-            }
+        prescribed.move_to(&mesh, centre);
+        run.step(dt, |axis, at, _, u| {
+            let [driving, part, velocity] = prescribed.on_face(axis, at);
+            *u += dt * driving;
+            *u += part * (carried[axis] + velocity - *u);
         });
         if n >= steps / 2 {
             sum += run.load().force.z;

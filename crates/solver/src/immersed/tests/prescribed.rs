@@ -3,6 +3,47 @@
 use super::*;
 use crate::dem::MotionConstraint;
 use crate::grid::{FACE_OFFSET, FaceVector};
+use rayon::prelude::*;
+
+/// Values on the faces that depend on the axis of a face and its position relative to a centre.
+/// They are evaluated when the centre moves.
+pub struct CentredValues<const N: usize, F> {
+    function: F,
+    centre: Option<DVec3>,
+    values: [Vec<[f64; N]>; 3],
+}
+
+impl<const N: usize, F: Fn(usize, DVec3) -> [f64; N] + Sync> CentredValues<N, F> {
+    pub fn new(function: F) -> CentredValues<N, F> {
+        CentredValues { function, centre: None, values: [const { Vec::new() }; 3] }
+    }
+
+    /// Moves the centre to the position `centre` in the grid.
+    pub fn move_to(&mut self, mesh: &Mesh, centre: DVec3) {
+        if self.centre.replace(centre) == Some(centre) {
+            return;
+        }
+        let (layout, function) = (mesh.layout(), &self.function);
+        let [nx, ny, nz] = mesh.cells;
+        for (axis, values) in self.values.iter_mut().enumerate() {
+            values.resize(layout.len(), [0.0; N]);
+            let planes = values.par_chunks_exact_mut(layout.plane()).enumerate().skip(1).take(nz);
+            planes.for_each(|(k, plane)| {
+                for j in 1..=ny {
+                    for i in 1..=nx {
+                        let x = mesh.position(FACE_OFFSET[axis], [i, j, k]) - centre;
+                        plane[layout.index(i, j, 0)] = function(axis, x);
+                    }
+                }
+            });
+        }
+    }
+
+    /// Values on the face `at` in memory.
+    pub fn on_face(&self, axis: usize, at: usize) -> [f64; N] {
+        self.values[axis][at]
+    }
+}
 
 /// A grain that is held or carried over the grid without spin, in a fluid of density 1. At the
 /// sides of the box the fluid moves with the grain.
@@ -35,9 +76,9 @@ impl PrescribedGrain {
     }
 
     /// Makes a step of `dt` [s] in which `act` changes the prediction. Its arguments are the axis
-    /// of a face, the position of the face [m], the velocity that it gains by the pressure at
-    /// the start of the step [m/s], and its velocity [m/s].
-    pub fn step(&mut self, dt: f64, act: impl Fn(usize, DVec3, f64, &mut f64)) {
+    /// of a face, its place in memory, the velocity that it gains by the pressure at the start of
+    /// the step [m/s], and its velocity [m/s].
+    pub fn step(&mut self, dt: f64, act: impl Fn(usize, usize, f64, &mut f64)) {
         let (kinematics, last_loads) = (self.grains.each_ref().map(RigidState::of), self.loads);
         let velocity = self.grains[0].rigid_velocity();
         let previous = [PreviousStep { velocity, ..Default::default() }];
@@ -51,7 +92,7 @@ impl PrescribedGrain {
                 let [i, j, k] = cell;
                 let at = mesh.layout().index(i, j, k);
                 let u = &mut self.flow.predicted.component_mut(axis)[at];
-                act(axis, mesh.position(FACE_OFFSET[axis], cell), pressure_gain, u);
+                act(axis, at, pressure_gain, u);
             }
         }
         self.grains[0].pose.position += dt * self.grains[0].velocity;

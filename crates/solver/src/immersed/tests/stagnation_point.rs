@@ -15,7 +15,7 @@
 //!
 //! The unit of length is the spacing of the grid, that of time 1 / a. The density is 1.
 
-use super::prescribed::PrescribedGrain;
+use super::prescribed::{CentredValues, PrescribedGrain};
 use super::*;
 use crate::grid::FACE_OFFSET;
 use crate::immersed::forcing::pressure_weight;
@@ -176,16 +176,21 @@ impl Case {
         let steps = (TIME * fastest / 0.2).ceil() as usize;
         let dt = TIME / steps as f64;
         let (mut sums, mut count) = ([0.0; 3], 0.0);
+        let mut prescribed = CentredValues::new(|axis, x: DVec3| {
+            let part = ((x.length() - NEAR) / GROWTH).clamp(0.0, 1.0).powi(2);
+            if part == 0.0 {
+                return [0.0; 3];
+            }
+            [part, layer.velocity(axis, x), layer.pressure_acceleration(axis, x)]
+        });
         for n in 1..=steps {
             let centre = start + n as f64 * dt * carried;
-            run.step(dt, |axis, x, pressure_gain, u| {
-                let x = x - centre;
-                let part = ((x.length() - NEAR) / GROWTH).clamp(0.0, 1.0).powi(2);
-                if part > 0.0 {
-                    // The pressure tends to the exact one where the velocity is prescribed.
-                    let missing = pressure_gain - dt * layer.pressure_acceleration(axis, x);
-                    *u += part * (carried[axis] + layer.velocity(axis, x) + missing - *u);
-                }
+            prescribed.move_to(&mesh, centre);
+            run.step(dt, |axis, at, pressure_gain, u| {
+                let [part, velocity, acceleration] = prescribed.on_face(axis, at);
+                // The pressure tends to the exact one where the velocity is prescribed.
+                let missing = pressure_gain - dt * acceleration;
+                *u += part * (carried[axis] + velocity + missing - *u);
             });
             if n as f64 * dt > STEADY && n % 5 == 0 {
                 let [integral, closed] = shear(&run, &layer, centre, dt);
