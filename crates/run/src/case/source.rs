@@ -222,6 +222,16 @@ impl Source {
                     Some(kind) => format!("wrong kind of value: {}", wrong_kind(kind)),
                     None => plainly(message),
                 };
+                // A list of tables in place of one: its first table is read as the first key.
+                let is_header = |span: &Range<usize>| {
+                    self.text.get(span.clone()).is_some_and(|text| text.starts_with("[["))
+                };
+                if text.contains("found a table") && span.as_ref().is_some_and(is_header) {
+                    let name = owner.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+                    let help = format!("write it once, with single brackets: [{name}]");
+                    let problem = Problem::new("found a list of tables, expected one table");
+                    return self.locate(problem.key(name).help(help), span.as_ref(), "here");
+                }
                 let help = match message {
                     "duplicate key" => Some(
                         "each key and table is written once; rows of a list such as the grains \

@@ -30,6 +30,16 @@ fn a_mistyped_key_is_located_and_corrected() {
 }
 
 #[test]
+fn a_table_with_the_brackets_of_a_list_is_named() {
+    for name in ["fluid", "domain", "time"] {
+        let p = problem(&CASE.replace(&format!("[{name}]"), &format!("[[{name}]]")), &[]);
+        assert_eq!(p.message, "found a list of tables, expected one table");
+        assert_eq!(p.key.as_deref(), Some(name));
+        assert!(p.help.unwrap().ends_with(&format!(": [{name}]")));
+    }
+}
+
+#[test]
 fn a_wrong_unit_is_located() {
     let p = problem(&CASE.replace("1 mPa s", "1 mm"), &[]);
     assert_eq!(p.place(), Some(("case.toml", 3, 13)));
