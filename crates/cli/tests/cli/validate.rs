@@ -111,7 +111,8 @@ fn concurrent_runs_are_evaluated_in_the_order_of_the_suite() {
     let (folder, _) = suites(&text);
     let results = |jobs| {
         let options = ["--level", "full", "--json", "--threads", "1", "--jobs", jobs];
-        let done = validate(folder.path(), &options).success();
+        // On the moon the ball falls slower than the bound of the second run allows.
+        let done = validate(folder.path(), &options).code(1);
         String::from_utf8(done.get_output().stdout.clone()).unwrap()
     };
     let both = results("2");
