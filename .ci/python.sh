@@ -37,8 +37,8 @@ python3 .ci/first_example.py docs/python.md > "$work/first.py"
 (cd "$work" && "$work/plain/bin/python" first.py)
 (cd "$work" && "$work/plain/bin/python" "$root/.ci/imports.py")
 
-# 3. Tests with optional packages and the notebooks; beside them on another core the types and the
-# statistics of the studies by a second route.
+# 3. Tests with optional packages; beside them on another core the types and the statistics of the
+# studies by a second route. Then the notebooks, whose time is bounded.
 python3 -m venv "$work/full"
 "$work/full/bin/pip" install -q "$wheel[all]" pytest mypy pandas-stubs \
   nbclient ipykernel matplotlib trimesh lifelines
@@ -59,7 +59,7 @@ fi
 beside=$!
 (cd "$work" && GRAINWAKE_CLI="$program" \
   full/bin/python -m pytest -q -p no:cacheprovider "$root/crates/python/tests")
+wait "$beside"
 (cd "$work" && full/bin/python "$root/.ci/notebooks.py" 60 "$input/notebooks" \
   "$root"/docs/notebooks/*.ipynb)
-wait "$beside"
 echo "python: all checks passed in $((SECONDS - started)) s"

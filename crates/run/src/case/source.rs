@@ -54,6 +54,9 @@ const NEEDED: [(&str, &str); 2] = [
     ("time", "end = ..., for example end = \"1 s\""),
 ];
 
+/// Tables that a case has once. [run] is missing: other files have a list of that name.
+const SINGLE: [&str; 7] = ["domain", "fluid", "coupling", "contact", "time", "output", "expect"];
+
 impl Source {
     /// Reads the text of a file called `name` and applies overrides: `-time.step` removes a key,
     /// `time.end=0.5` sets one. Keys are removed first.
@@ -180,6 +183,9 @@ impl Source {
 
     /// Rewords an error of the TOML reader in the terms of the file.
     fn located(&self, error: &toml::de::Error) -> Problem {
+        if let Some(problem) = self.doubled_brackets() {
+            return problem;
+        }
         let message = error.message();
         let span = error.span();
         let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
@@ -222,16 +228,6 @@ impl Source {
                     Some(kind) => format!("wrong kind of value: {}", wrong_kind(kind)),
                     None => plainly(message),
                 };
-                // A list of tables in place of one: its first table is read as the first key.
-                let is_header = |span: &Range<usize>| {
-                    self.text.get(span.clone()).is_some_and(|text| text.starts_with("[["))
-                };
-                if text.contains("found a table") && span.as_ref().is_some_and(is_header) {
-                    let name = owner.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
-                    let help = format!("write it once, with single brackets: [{name}]");
-                    let problem = Problem::new("found a list of tables, expected one table");
-                    return self.locate(problem.key(name).help(help), span.as_ref(), "here");
-                }
                 let help = match message {
                     "duplicate key" => Some(
                         "each key and table is written once; rows of a list such as the grains \
@@ -249,6 +245,20 @@ impl Source {
         let mut problem = Problem::new(text);
         problem.help = help;
         self.locate(problem, span.as_ref(), &label)
+    }
+
+    /// Returns the problem of a list of tables in place of a single one. The reader would take its
+    /// first table for the value of the first key.
+    fn doubled_brackets(&self) -> Option<Problem> {
+        let is_list = |name: &&str| {
+            let first = self.value_of(&format!("{name}.0"));
+            let text = first.and_then(|span| self.text.get(span.clone()));
+            text.is_some_and(|text| text.starts_with("[["))
+        };
+        let name = SINGLE.into_iter().find(is_list)?;
+        let problem = Problem::new("found a list of tables, expected one table").key(name);
+        let help = format!("write it once, with single brackets: [{name}]");
+        Some(self.locate(problem.help(help), self.value_of(name), "here"))
     }
 
     /// Returns the problem of a missing top-level key or table, which has no position.

@@ -68,7 +68,7 @@ impl<R: Real> NestedFlow<R> {
                 reused = Some(Flow { mesh, ..flow });
             } else {
                 self.past_times = self.past_times + flow.poisson_times();
-                replaced = Some(flow);
+                replaced = Some(flow.state().0.map(<[R]>::to_vec));
             }
             of_old = Some(of_flow);
         }
@@ -79,7 +79,7 @@ impl<R: Real> NestedFlow<R> {
         for (field, (from, to)) in from.into_iter().zip(to).enumerate() {
             let (is_velocity, component) = (field < 3, (field < 6).then_some(field % 3));
             let old_values = match &replaced {
-                Some(flow) => flow.state().0[field],
+                Some(fields) => fields[field].as_slice(),
                 None => {
                     copy.clear();
                     copy.extend_from_slice(to);

@@ -62,9 +62,9 @@ impl Nesting {
     }
 
     /// Sets a refined field: to the values of an old refined box where that overlaps this one,
-    /// elsewhere by linear interpolation of `from` on the whole grid. Without `from` the other
-    /// values stay, and those on the sides of the old box count as known. `component` is that of a
-    /// field on faces, which includes the upper side.
+    /// elsewhere by linear interpolation of `from` on the whole grid. Without `from`, as for the
+    /// velocity, the other values stay. `component` is that of a field on faces, which includes the
+    /// upper side.
     pub fn transfer<R: Real>(
         &self,
         component: Option<usize>,
@@ -76,10 +76,10 @@ impl Nesting {
         let last = [0, 1, 2].map(|axis| layout.cells[axis] + usize::from(component == Some(axis)));
         let interpolated = from.map(|from| self.interpolated(component, from));
         let old = old.map(|(old, values)| {
-            let common = |axis| {
-                let on_faces = component == Some(axis);
-                old.common_positions(self, axis, on_faces, from.is_none())
-            };
+            // Only the velocity is known on the sides of the old box.
+            let with_sides = from.is_none();
+            let common =
+                |axis| old.common_positions(self, axis, component == Some(axis), with_sides);
             (old.refined, values, [0, 1, 2].map(common))
         });
         let planes = to.par_chunks_exact_mut(layout.plane()).enumerate();

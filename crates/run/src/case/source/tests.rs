@@ -31,12 +31,16 @@ fn a_mistyped_key_is_located_and_corrected() {
 
 #[test]
 fn a_table_with_the_brackets_of_a_list_is_named() {
-    for name in ["fluid", "domain", "time"] {
-        let p = problem(&CASE.replace(&format!("[{name}]"), &format!("[[{name}]]")), &[]);
+    let case = format!("{CASE}[contact]\nfriction = 0.3\nrestitution = 0.5\n");
+    for name in ["fluid", "domain", "time", "contact"] {
+        let p = problem(&case.replace(&format!("[{name}]"), &format!("[[{name}]]")), &[]);
         assert_eq!(p.message, "found a list of tables, expected one table");
         assert_eq!(p.key.as_deref(), Some(name));
         assert!(p.help.unwrap().ends_with(&format!(": [{name}]")));
     }
+    // A list keeps its own messages.
+    let p = problem(&case.replace("density = 2000", "density = {}"), &[]);
+    assert_eq!(p.key.as_deref(), Some("grain.0.density"));
 }
 
 #[test]
