@@ -22,9 +22,12 @@ pub struct ChosenRun<'a> {
     pub folder: PathBuf,
 }
 
-/// Executes the runs, as many at once as the arguments say, and calls `ended` with each run and its
-/// ending, in the order of the runs. The error ends the command, after a checkpoint of the other
-/// runs; that of an ending only its run.
+/// Executes the runs, as many at once as the arguments say. Calls `ended` with each run and its
+/// ending, in the order of the runs.
+///
+/// # Errors
+/// The first error that ends the command; the other runs write a checkpoint before. A run that
+/// becomes unstable ends with a message and does not end the command.
 pub fn execute(
     args: &ValidateArgs,
     runs: &[ChosenRun],

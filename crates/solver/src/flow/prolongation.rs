@@ -61,10 +61,10 @@ impl Nesting {
         pairs.map(extrapolate).collect()
     }
 
-    /// Sets a refined field: to the values of an old refined box where that overlaps this one,
-    /// elsewhere by linear interpolation of `from` on the whole grid. Without `from`, as for the
-    /// velocity, the other values stay. `component` is that of a field on faces, which includes the
-    /// upper side.
+    /// Sets a refined field. Where an old refined box overlaps this one, its values are kept.
+    /// Elsewhere `from`, a field of the whole grid, is interpolated linearly; without `from`, as for
+    /// the velocity, the values stay. A field on faces has a `component`, and includes the upper
+    /// side.
     pub fn transfer<R: Real>(
         &self,
         component: Option<usize>,
@@ -101,8 +101,8 @@ impl Nesting {
         });
     }
 
-    /// Whether each cell of the whole grid inside this refined box, counted from 0 at its lower
-    /// corner, was outside an old one.
+    /// Returns whether a cell of the whole grid lies outside an old refined box. Cells are counted
+    /// from 0 at the lower corner of this box.
     pub fn new_cells(&self, old: Option<&Nesting>) -> impl Fn([usize; 3]) -> bool + use<> {
         let common =
             old.map(|old| [0, 1, 2].map(|axis| old.common_positions(self, axis, false, false)));
