@@ -62,9 +62,9 @@ impl Nesting {
     }
 
     /// Sets a refined field. Where an old refined box overlaps this one, its values are kept.
-    /// Elsewhere `from`, a field of the whole grid, is interpolated linearly; without `from`, as for
-    /// the velocity, the values stay. A field on faces has a `component`, and includes the upper
-    /// side.
+    /// Elsewhere `from`, a field of the whole grid, is interpolated linearly. Without `from`, as
+    /// for the velocity, the values stay. A field on faces has a `component`, and includes the
+    /// upper side.
     pub fn transfer<R: Real>(
         &self,
         component: Option<usize>,
