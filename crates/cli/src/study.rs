@@ -9,7 +9,8 @@ use grainwake_run::FailureKind;
 use grainwake_run::number_format::size;
 use grainwake_study::{
     Analysis, Archive, MANIFEST, Options, Outcome, Plan, Run, RunRecord, RunState, Selection,
-    StudyError, execute, expected_cost, note_on_unmeasured, records, run_state, write_tables,
+    StudyError, execute, expected_cost, note_on_unmeasured, one_per_grid, records, run_state,
+    time_steps, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -25,6 +26,11 @@ impl From<StudyError> for Exit {
             StudyError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
             StudyError::Case(error) => error.into(),
             StudyError::Report(error) => error.into(),
+            StudyError::NotTimed { kind, .. } => Exit::with_help(
+                exit_code(kind),
+                error.to_string(),
+                "use fewer simultaneous runs (--jobs N), or --dry-run without --measure",
+            ),
             StudyError::Occupied { .. } => {
                 Exit::refused(error.to_string(), "give another folder with -o")
             }
@@ -219,9 +225,19 @@ fn dry_run(
         lines.push(format!("{}: {doing}", run.name));
         to_do.push(run);
     }
-    let cost = expected_cost(&to_do, plan, &records(plan, folder)?, folder);
+    let mut timed = Vec::new();
+    for run in if args.measure { one_per_grid(&to_do) } else { Vec::new() } {
+        let step = time_steps(run, jobs, threads)?;
+        if !args.quiet {
+            let seconds = step.measured_s / threads as f64;
+            tell!("{}: {seconds:.3} s per step", run.name);
+        }
+        timed.push(step);
+    }
+    let cost = expected_cost(&to_do, plan, &records(plan, folder)?, folder, &timed);
     let time = clock(cost.wall_s / (jobs * threads) as f64);
     let basis = match cost.basis {
+        _ if !timed.is_empty() => "from timed steps".to_owned(),
         0 => "no run is finished; runs that stop at rest or separation count to their end".into(),
         n => format!("from {}", count(n, "finished run")),
     };

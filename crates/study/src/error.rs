@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk::write_atomically;
 use grainwake_report::ReportError;
+use grainwake_run::FailureKind;
 use grainwake_run::case::{CaseError, Problem};
 
 /// Reason why a study cannot be read, planned or stored.
@@ -33,6 +34,16 @@ pub enum StudyError {
         folder: PathBuf,
         /// Contents of the folder.
         what: String,
+    },
+    /// The steps of a run could not be timed.
+    #[error("{run} cannot be timed: {what}")]
+    NotTimed {
+        /// Name of the run.
+        run: String,
+        /// The error.
+        what: String,
+        /// Kind of the error.
+        kind: FailureKind,
     },
     /// A report could not be written.
     #[error(transparent)]

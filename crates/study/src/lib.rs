@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`mod@format`] | text form of values |
 //! | [`plan`] | study file to models, models to runs with a stable name and hash |
-//! | [`run`] | state of a run, and the job queue that executes and resumes runs |
+//! | [`run`] | state of a run, time of its steps, job queue that executes and resumes runs |
 //! | [`measure`] | one run folder to measured values, and the table of all runs |
 //! | [`analysis`] | statistics over runs, right-censored observations, verdicts on claims |
 //! | [`page`] | figures and report page |
@@ -24,7 +24,7 @@ pub mod run;
 
 pub use analysis::{correlation, factor_mean, kissing, observation, statistics, survival, verdict};
 pub use error::StudyError;
-pub use measure::cost::{Cost, expected_cost};
+pub use measure::cost::{Cost, expected_cost, one_per_grid};
 pub use measure::pair::{PairHistory, PairMeasures};
 pub use measure::record::{RunRecord, note_on_unmeasured, records};
 pub use measure::settling::{GrainSettling, SettlingMeasures};
@@ -39,4 +39,5 @@ pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;
 pub use plan::{MANIFEST, Plan, RUNS, Run};
 pub use run::state::{Archive, RunState, StateKind, run_state};
+pub use run::step_time::{StepTime, time_steps};
 pub use run::{Options, Outcome, StudyObserver, execute};

@@ -135,6 +135,10 @@ pub struct StudyArgs {
     /// Print the planned work with its estimated time and memory, without running any
     #[arg(long)]
     pub dry_run: bool,
+    /// With --dry-run: time the first steps of one run per size of grid, as many copies at once as
+    /// there are jobs, and estimate the time from them
+    #[arg(long, requires = "dry_run")]
+    pub measure: bool,
     #[command(flatten)]
     pub overrides: Overrides,
     /// Restart failed runs

@@ -113,6 +113,25 @@ fn lists_and_dry_runs_write_nothing() {
 }
 
 #[test]
+fn a_dry_run_times_steps_and_writes_nothing() {
+    let (folder, path) = study();
+    let out = folder.path().join("out");
+    let run =
+        |more: &[&str]| grainwake().arg("study").arg(&path).arg("-o").arg(&out).args(more).assert();
+    // Both runs have the same grid, so the steps of one are timed.
+    run(&["--dry-run", "--measure", "--jobs", "2", "--threads", "1"])
+        .success()
+        .stderr(contains("light: 0.").and(contains("heavy").not()))
+        .stdout(contains("2 of 2 to do: about").and(contains("from timed steps")));
+    let vast = ["--set", "domain.size=[\"1 m\", \"1 m\", \"1 m\"]"];
+    run(&["--dry-run", "--measure", vast[0], vast[1]])
+        .code(2)
+        .stderr(contains("light cannot be timed: the run needs").and(contains("--jobs N")));
+    run(&["--measure"]).code(2).stderr(contains("--dry-run"));
+    assert!(!out.exists());
+}
+
+#[test]
 fn one_share_after_the_other_is_the_whole() {
     let (folder, path) = study();
     let out = folder.path().join("out");

@@ -1,6 +1,7 @@
 //! Execution of the runs of a study: several at once, each resumed from its last checkpoint.
 
 pub mod state;
+pub mod step_time;
 
 use std::collections::VecDeque;
 use std::panic::AssertUnwindSafe;
@@ -83,12 +84,7 @@ pub fn execute(
     observer: &dyn StudyObserver,
 ) -> Result<Vec<(usize, Outcome)>, StudyError> {
     let jobs = options.jobs.clamp(1, chosen.len().max(1));
-    let pool = || rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
-    let pools: Vec<rayon::ThreadPool> = (0..jobs)
-        .map(|_| pool())
-        .collect::<Result<_, _>>()
-        .map_err(std::io::Error::other)
-        .at("start threads for", study)?;
+    let pools = pools(jobs, options.threads).at("start threads for", study)?;
     let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
     let disk_full = AtomicBool::new(false);
@@ -119,6 +115,12 @@ pub fn execute(
     let mut ended = ended.into_inner().unwrap_or_default();
     ended.sort_by_key(|(index, _)| *index);
     Ok(ended)
+}
+
+/// Starts the threads of each of the concurrent runs.
+fn pools(jobs: usize, threads: usize) -> std::io::Result<Vec<rayon::ThreadPool>> {
+    let pool = |_| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    (0..jobs).map(pool).collect::<Result<_, _>>().map_err(std::io::Error::other)
 }
 
 /// One run in the queue.
