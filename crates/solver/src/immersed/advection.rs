@@ -1,7 +1,7 @@
 //! Correction of the second-order central advection scheme at the links near a grain, plane by
 //! plane.
 //!
-//! A link joins two neighbouring faces of the same component. Two terms correct its flux:
+//! A link joins two neighbouring faces of the same component. Three terms correct its flux:
 //!
 //! 1. A face value near the surface represents the open part of the face only, q = A u. The product
 //!    of two such values carries A^2 u u where the flux is A u u. The flux relative to the grain is
@@ -9,30 +9,38 @@
 //! 2. The boundary layer is about one cell thick and moves with the grain. Second-order central
 //!    differences advect such a profile at about two thirds of its speed. Within two half-widths of
 //!    the band around the surface the sixth-order mean of six faces replaces the mean of two.
+//! 3. Velocities near the surface are averages over the band, and the average of a product exceeds
+//!    the product of the averages: next to a linear profile by the variance of the band times the
+//!    product of the gradients. Three quarters of this are added, less where the profile is steep,
+//!    since it is not linear over the band there (`docs/decisions/0028-averaged-products.md`).
 //!
 //! The correction adds to the flux over h
 //!
 //! ```text
 //! (1/A' - 1) (q_mean - U_q) (c - U_c) / h
 //! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
+//! 0.75 sigma^2 grad(q - U_q) . grad(c - U_c) / (1 + (G eps^2 / (8 nu))^2) / h
 //! ```
 //!
-//! The second term is left out at the ends of the grid, where fewer than six faces are in line.
+//! with G^2 the sum of the squares of both gradients. The second term is left out at the ends of
+//! the grid, where fewer than six faces are in line.
 //! |(1/A' - 1) (c - U_c)| is limited to 100 nu / h: through a face that is almost closed, a jet out
 //! of the grain would otherwise accelerate itself without bound
 //! (`docs/decisions/0023-jets-out-of-closed-faces.md`).
-//! Both are fluxes between two faces, so momentum is conserved
+//! All are fluxes between two faces, so momentum is conserved
 //! (`docs/decisions/0003-advection-next-to-grains.md`). `links.rs` finds the links,
 //! `immersed::reference` has the scalar form.
 //!
 //! Legend: q advected component, c advecting velocity, U rigid velocity at the middle of the link,
-//! A and A' aperture and limited aperture of the link, h spacing along the link.
+//! A and A' aperture and limited aperture of the link, h spacing along the link, eps and sigma^2
+//! half-width and variance of the band, nu kinematic viscosity.
 
 use std::ops::Range;
 
+use super::geometry::aperture::band_variance;
 use super::geometry::{FaceRow, LocatedBody};
 use super::links::{
-    BoxVelocity, LinkPlanes, NO_LINK, RigidLinks, compute_link_weights, listed_faces,
+    BoxVelocity, LinkPlanes, LinkSlopes, NO_LINK, RigidLinks, compute_link_weights, listed_faces,
 };
 use crate::dem::RigidState;
 use crate::flow::{OldState, Prediction};
@@ -42,6 +50,12 @@ use grainwake_simd::{Kernel, Stencil, Vector, dispatch};
 
 /// Largest Reynolds number |(1/A - 1) (c - U_c)| h / nu of the first term.
 pub const LARGEST_EXCESS: f64 = 100.0;
+
+/// Part of the flux that averages over the band leave out, which the third term adds.
+pub const AVERAGED_PART: f64 = 0.75;
+
+/// Reynolds number G eps^2 / nu of the gradients at which the third term is halved.
+pub const STEEP: f64 = 8.0;
 
 /// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
 /// [`LocatedBody::distance`].
@@ -134,6 +148,10 @@ struct ComponentLinks<'a, R> {
     component: usize,
     /// Half-width of the band [m].
     eps: f64,
+    /// Part of the variance of the band that the third term takes [m^2].
+    variance: f64,
+    /// (eps^2 / (8 nu))^2 [s^2].
+    steepness: f64,
     /// Indices of the unknown faces along each axis.
     unknowns: [Range<i32>; 3],
     axes: [LinkAxis; 3],
@@ -150,6 +168,7 @@ struct LinkAxis {
     two_faces: Stencil<6>,
     /// The two faces of the advecting component, relative to the lower face.
     advecting: Stencil<2>,
+    slopes: LinkSlopes,
     /// 1 / h [1/m].
     per_spacing: f64,
     /// Largest |(1/A - 1) (c - U_c)| [m/s].
@@ -165,6 +184,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         velocity: &'a BoxVelocity<'a, R>,
         component: usize,
     ) -> ComponentLinks<'a, R> {
+        let rigid = RigidLinks::new(mesh, kinematics, body.lowest, component);
         let axes = [0, 1, 2].map(|along| {
             let [next, across] = [along, component].map(|axis| velocity.strides[axis] as isize);
             LinkAxis {
@@ -175,6 +195,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
                     true => Stencil::new([0, next]),
                     false => Stencil::new([next, next - across]),
                 },
+                slopes: LinkSlopes::new(mesh, velocity.strides, &rigid, [along, component]),
                 per_spacing: 1.0 / mesh.spacing[along],
                 largest_excess: LARGEST_EXCESS * nu / mesh.spacing[along],
             }
@@ -184,9 +205,11 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
             velocity,
             component,
             eps,
+            variance: AVERAGED_PART * band_variance(eps),
+            steepness: (eps * eps / (STEEP * nu)).powi(2),
             unknowns: [0, 1, 2].map(|axis| body.index_map.unknown_range(component, axis)),
             axes,
-            rigid: RigidLinks::new(mesh, kinematics, body.lowest, component),
+            rigid,
         }
     }
 
@@ -310,7 +333,21 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
                 flux = limit.select_below(size, limited, flux);
             }
         }
-        let flux = flux * V::constant(axis.per_spacing);
+        let flux =
+            (flux + self.averaged_part::<V>(axis, [q, c], at)) * V::constant(axis.per_spacing);
         between.select_below(weight, flux, zero)
+    }
+
+    /// Third term of the flux through links along an axis, times h [m^2/s^2].
+    #[inline(always)]
+    fn averaged_part<V: Vector<Number = f64>>(
+        &self,
+        axis: &LinkAxis,
+        [q, c]: [&[R]; 2],
+        at: usize,
+    ) -> V {
+        let [product, square] = axis.slopes.products::<V, R>([q, c], at);
+        let reduction = square.mul_add(V::constant(self.steepness), V::constant(1.0));
+        (product * V::constant(self.variance)).div(reduction)
     }
 }

@@ -1,5 +1,6 @@
 //! Links next to a grain: their weights, plane by plane, in single precision like the distances,
-//! their rigid velocities, and the velocity in the box around the grain.
+//! their rigid velocities, slopes of the velocity at them, and the velocity in the box around the
+//! grain.
 //!
 //! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
 //! marks links without correction. `immersed::reference` has the scalar form.
@@ -17,7 +18,7 @@ use crate::dem::RigidState;
 use crate::flow::OldState;
 use crate::grid::{FACE_OFFSET, Mesh};
 use crate::math::{Aligned, Real};
-use grainwake_simd::{Kernel, MAX_LANES, Vector, dispatch};
+use grainwake_simd::{Kernel, MAX_LANES, Stencil, Vector, dispatch};
 
 /// Weight where there is no link.
 pub(super) const NO_LINK: f64 = -1.0;
@@ -198,6 +199,64 @@ impl RigidLinks {
         [0, 1, 2].map(|along| {
             [0, 1].map(|of| self.first[along][of] + y * by_y[along][of] + z * by_z[along][of])
         })
+    }
+}
+
+/// Slopes of the advected and the advecting component in the middle of a link along each axis,
+/// relative to the grain.
+pub struct LinkSlopes([[Slope; 2]; 3]);
+
+/// Sum of the first two faces less that of the last two, times the factor [1/m], less the slope of
+/// the rigid velocity [1/s].
+#[derive(Clone, Copy)]
+struct Slope {
+    faces: Stencil<4>,
+    factor: f64,
+    rigid: f64,
+}
+
+impl LinkSlopes {
+    /// Slopes at the links along axis `along` between faces of `component`; `strides` [entries] are
+    /// those of the velocity.
+    pub fn new(
+        mesh: &Mesh,
+        strides: [usize; 3],
+        rigid: &RigidLinks,
+        [along, component]: [usize; 2],
+    ) -> LinkSlopes {
+        let strides = strides.map(|stride| stride as isize);
+        let next = strides[along];
+        // The two faces of each component at a link.
+        let below = if along == component { 0 } else { next - strides[component] };
+        let faces = [[0, next], [below, next]];
+        let slope = |axis: usize, of: usize| {
+            let ([a, b], step, h) = (faces[of], strides[axis], mesh.spacing[axis]);
+            // A difference of both along this axis, central differences around both along others.
+            let (faces, width) = match b - a == step {
+                true => ([b, b, a, a], h),
+                false => ([a + step, b + step, a - step, b - step], 2.0 * h),
+            };
+            let rigid = rigid.change[axis][along][of] / h;
+            Slope { faces: Stencil::new(faces), factor: 0.5 / width, rigid }
+        };
+        LinkSlopes([0, 1, 2].map(|axis| [slope(axis, 0), slope(axis, 1)]))
+    }
+
+    /// Scalar product of both gradients and sum of their squares [1/s^2] at the links whose lower
+    /// faces lie from position `at` on.
+    #[inline(always)]
+    pub fn products<V: Vector<Number = f64>, R: Real>(&self, of: [&[R]; 2], at: usize) -> [V; 2] {
+        let [mut product, mut square] = [V::constant(0.0); 2];
+        for pair in &self.0 {
+            let [q, c] = [0, 1].map(|n| {
+                let [a, b, c, d] = pair[n].faces.load::<V, R>(of[n], at);
+                let rigid = V::constant(-pair[n].rigid);
+                ((a + b) - (c + d)).mul_add(V::constant(pair[n].factor), rigid)
+            });
+            product = q.mul_add(c, product);
+            square = c.mul_add(c, q.mul_add(q, square));
+        }
+        [product, square]
     }
 }
 

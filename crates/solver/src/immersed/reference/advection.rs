@@ -3,14 +3,14 @@
 //! Legend: d signed distance of a link, A aperture, q advected component, c advecting velocity, U
 //! rigid velocity at the middle of the link, h spacing along the link.
 
-use glam::IVec3;
+use glam::{DVec3, IVec3};
 
 use super::Reference;
 use crate::dem::RigidState;
 use crate::flow::OldState;
-use crate::immersed::advection::LARGEST_EXCESS;
-use crate::immersed::geometry::aperture::forcing_reach;
+use crate::immersed::advection::{AVERAGED_PART, LARGEST_EXCESS, STEEP};
 use crate::immersed::geometry::aperture::reference::inverse_aperture_excess;
+use crate::immersed::geometry::aperture::{band_variance, forcing_reach};
 
 impl Reference {
     /// Correction of the advection of a face [m/s^2] next to grain `index`: flux in through the
@@ -82,6 +82,44 @@ impl Reference {
         let rigid = kinematics.velocity.at(middle);
         let largest = LARGEST_EXCESS * self.kinematic_viscosity / h;
         let excess = (weight * (c - rigid[axis])).clamp(-largest, largest);
-        (excess * (0.5 * (q(0) + q(1)) - rigid[component]) + c / 60.0 * sixth_order) / h
+        let spin = kinematics.velocity.angular;
+        let averaged = self.averaged_part(known, spin, component, axis, lower);
+        (excess * (0.5 * (q(0) + q(1)) - rigid[component]) + c / 60.0 * sixth_order + averaged) / h
+    }
+
+    /// Flux relative to a grain with this spin that averages over the band leave out, times h
+    /// [m^2/s^2].
+    fn averaged_part(
+        &self,
+        known: &OldState<f64>,
+        spin: DVec3,
+        component: usize,
+        axis: usize,
+        lower: IVec3,
+    ) -> f64 {
+        let u = |of: usize, face: IVec3| known.velocity.component(of)[self.at(face)];
+        let e = IVec3::AXES[axis];
+        let advected = [lower, lower + e];
+        let advecting = match axis == component {
+            true => advected,
+            false => [lower + e - IVec3::AXES[component], lower + e],
+        };
+        // Slope of a component along `k` in the middle between two of its faces: the difference of
+        // both if they lie along k, else the mean of the central differences around each.
+        let slope = |of: usize, [a, b]: [IVec3; 2], k: usize| {
+            let step = IVec3::AXES[k];
+            let rigid = spin.cross(DVec3::AXES[k])[of];
+            let difference = if b - a == step {
+                u(of, b) - u(of, a)
+            } else {
+                0.25 * (u(of, a + step) + u(of, b + step) - u(of, a - step) - u(of, b - step))
+            };
+            difference / self.mesh.spacing[k] - rigid
+        };
+        let slopes = [0, 1, 2].map(|k| [slope(component, advected, k), slope(axis, advecting, k)]);
+        let product: f64 = slopes.iter().map(|[q, c]| q * c).sum();
+        let square: f64 = slopes.iter().flatten().map(|s| s * s).sum();
+        let reynolds = square.sqrt() * self.eps * self.eps / self.kinematic_viscosity;
+        AVERAGED_PART * band_variance(self.eps) * product / (1.0 + (reynolds / STEEP).powi(2))
     }
 }

@@ -302,6 +302,47 @@ fn the_advection_correction_matches_the_reference() {
     assert!(largest[1] > 0.1 && largest[0] > 1.2 * largest[1], "{largest:?}");
 }
 
+/// Next to a grain at rest in u = a x z the average of u u over the band exceeds the square of the
+/// average by sigma^2 a^2 (x^2 + z^2).
+#[test]
+fn the_flux_next_to_a_grain_is_that_of_averaged_products() {
+    let mut case = Case::new(Scheme::Aperture);
+    let (eps, index, a) = (case.locator.eps, 1, 0.7);
+    let mesh = case.reference.mesh.clone();
+    case.flow.velocity.fill_with(&mesh, |axis, x| if axis == 0 { a * x.x * x.z } else { 0.0 });
+    let grain = case.reference.grains[index].clone();
+    let at_rest = grain.with_velocity(DVec3::ZERO).with_angular_velocity(DVec3::ZERO);
+    let kinematics = RigidState::of(&at_rest);
+    // The profile is steep at the smaller viscosity.
+    for nu in [1e6, 0.01] {
+        let (known, _) = case.flow.prediction();
+        let (mut scratch, mut correction) = Default::default();
+        let body = &case.located[index].0;
+        find_correction(eps, nu, &known, &kinematics, body, &mut scratch, &mut correction);
+        let found = case.by_row(index, 0, &correction[0], 0.0);
+        let mut faces = case.reference.faces(0);
+        faces.retain(|face| {
+            // All links of these faces are open and within reach; walls and other grains are far.
+            let inner = face.x > 3 && face.x < 29 && face.z > 3 && face.z < 27;
+            let d = |at: IVec3| case.reference.distance(index, 0, *face + at);
+            let around = [IVec3::X, IVec3::Y, IVec3::Z].map(|e| d(e).and(d(-e)));
+            let own = around.iter().all(Option::is_some);
+            inner && own && d(IVec3::ZERO).is_some_and(|d| d > 1.45 * eps && d < 1.55 * eps)
+        });
+        assert!(faces.len() > 40, "{}", faces.len());
+        for face in faces {
+            let x = case.reference.position(0, face);
+            let added = 0.75 * (1.0 / 3.0 - 2.0 / std::f64::consts::PI.powi(2)) * eps * eps;
+            // d/dx of s / (1 + k s), s = a^2 (x^2 + z^2); both gradients have this square.
+            let s = a * a * (x.x * x.x + x.z * x.z);
+            let k = 2.0 * (eps * eps / (8.0 * nu)).powi(2);
+            let expected = -added * 2.0 * a * a * x.x / (1.0 + k * s).powi(2);
+            let tolerance = if nu > 1.0 { 1e-12 } else { 0.02 * expected.abs() };
+            assert_close(found[case.reference.at(face)], expected, tolerance, "correction");
+        }
+    }
+}
+
 #[test]
 fn impulse_and_imposed_rigidity_match_the_reference() {
     for scheme in [Scheme::Aperture, Scheme::Paper] {
