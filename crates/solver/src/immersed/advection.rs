@@ -19,7 +19,7 @@
 //! ```text
 //! (1/A' - 1) (q_mean - U_q) (c - U_c) / h
 //! c (7 (q_0 + q_1) - 8 (q_-1 + q_2) + (q_-2 + q_3)) / (60 h)
-//! 0.75 sigma^2 grad(q - U_q) . grad(c - U_c) / (1 + (G eps^2 / (8 nu))^2) / h
+//! 0.75 sigma^2 grad(q - U_q) . grad(c - U_c) / (1 + (G eps^2 / (7 nu))^2) / h
 //! ```
 //!
 //! with G^2 the sum of the squares of both gradients. The second term is left out at the ends of
@@ -55,7 +55,7 @@ pub const LARGEST_EXCESS: f64 = 100.0;
 pub const AVERAGED_PART: f64 = 0.75;
 
 /// Reynolds number G eps^2 / nu of the gradients at which the third term is halved.
-pub const STEEP: f64 = 8.0;
+pub const STEEP: f64 = 7.0;
 
 /// Change of the tendency of each face near a grain [m/s^2], by component, in the order of
 /// [`LocatedBody::distance`].
@@ -150,7 +150,7 @@ struct ComponentLinks<'a, R> {
     eps: f64,
     /// Part of the variance of the band that the third term takes [m^2].
     variance: f64,
-    /// (eps^2 / (8 nu))^2 [s^2].
+    /// (eps^2 / (7 nu))^2 [s^2].
     steepness: f64,
     /// Indices of the unknown faces along each axis.
     unknowns: [Range<i32>; 3],
