@@ -200,9 +200,9 @@ fn start_reynolds(setup: &Setup) -> Option<f64> {
     setup.grains.iter().map(of).reduce(f64::max)
 }
 
-/// Error of the drag where the boundary layer is resolved, at 8 cells per diameter. It falls slowly
-/// with the number of cells (`docs/accuracy.md`: 2.5 % at 8 and 1.9 % at 16 cells, Re 100).
-const RESOLVED_DRAG_ERROR: f64 = 0.028;
+/// Error of the drag where the boundary layer is resolved, at 8 cells per diameter
+/// (`docs/accuracy.md`: 1.3 % at 8 and 0.2 % at 16 cells, Re 100).
+const RESOLVED_DRAG_ERROR: f64 = 0.02;
 
 /// Relative error of the drag with `n` cells per diameter at a Reynolds number, where the boundary
 /// layer is not resolved. It bounds the errors at 8, 12 and 16 cells in `docs/accuracy.md`: 8.2,
@@ -214,7 +214,7 @@ pub(super) fn thin_layer_drag_error(n: f64, reynolds: f64) -> f64 {
 /// Relative error of the drag expected with `n` cells per diameter at a Reynolds number: a bound of
 /// the errors measured in `docs/accuracy.md`, Re 20 to 350, from 8 cells on.
 fn drag_error(n: f64, reynolds: f64) -> f64 {
-    let resolved = RESOLVED_DRAG_ERROR * (8.0 / n).sqrt();
+    let resolved = RESOLVED_DRAG_ERROR * 8.0 / n;
     resolved.max(thin_layer_drag_error(n, reynolds))
 }
 
@@ -268,14 +268,13 @@ mod tests {
     fn expected_errors_bound_the_measured_ones() {
         // Reynolds number, cells per diameter, measured error of the drag (docs/accuracy.md).
         let measured = [
-            (20.0, 8.0, 0.009),
-            (50.0, 8.0, 0.022),
-            (100.0, 8.0, 0.0245),
-            (100.0, 16.0, 0.019),
-            (100.0, 24.0, 0.013),
-            (100.0, 32.0, 0.010),
-            (100.0, 48.0, 0.0063),
-            (150.0, 8.0, 0.0002),
+            (20.0, 8.0, 0.001),
+            (50.0, 8.0, 0.008),
+            (100.0, 8.0, 0.013),
+            (100.0, 16.0, 0.003),
+            (100.0, 24.0, 0.001),
+            (100.0, 32.0, 0.001),
+            (150.0, 8.0, 0.005),
             (300.0, 8.0, 0.055),
             (350.0, 8.0, 0.082),
             (300.0, 12.0, 0.0357),
@@ -290,7 +289,7 @@ mod tests {
         assert_eq!(drag_error_text(drag_error(8.0, 350.0), 1), "9.1 %");
         assert_eq!(drag_error_text(drag_error(8.0, 10_900.0), 1), "more than 30 %");
         assert_eq!(cells_for_drag_error(0.05, 100.0), 8);
-        assert_eq!(cells_for_drag_error(0.02, 100.0), 16);
+        assert_eq!(cells_for_drag_error(0.02, 100.0), 10);
         assert_eq!(cells_for_drag_error(0.05, 300.0), 12);
         assert_eq!(cells_for_drag_error(0.02, 300.0), 22);
     }
