@@ -308,7 +308,7 @@ fn the_advection_correction_matches_the_reference() {
 fn the_flux_next_to_a_grain_is_that_of_averaged_products() {
     let mut case = Case::new(Scheme::Aperture);
     let (eps, index, a) = (case.locator.eps, 1, 0.7);
-    let mesh = case.reference.mesh.clone();
+    let mesh = case.reference.mesh;
     case.flow.velocity.fill_with(&mesh, |axis, x| if axis == 0 { a * x.x * x.z } else { 0.0 });
     let grain = case.reference.grains[index].clone();
     let at_rest = grain.with_velocity(DVec3::ZERO).with_angular_velocity(DVec3::ZERO);
