@@ -246,17 +246,22 @@ impl LinkSlopes {
     /// faces lie from position `at` on.
     #[inline(always)]
     pub fn products<V: Vector<Number = f64>, R: Real>(&self, of: [&[R]; 2], at: usize) -> [V; 2] {
+        // Without closures, which would not be inlined in a kernel.
         let [mut product, mut square] = [V::constant(0.0); 2];
-        for pair in &self.0 {
-            let [q, c] = [0, 1].map(|n| {
-                let [a, b, c, d] = pair[n].faces.load::<V, R>(of[n], at);
-                let rigid = V::constant(-pair[n].rigid);
-                ((a + b) - (c + d)).mul_add(V::constant(pair[n].factor), rigid)
-            });
+        for [advected, advecting] in &self.0 {
+            let (q, c) = (advected.load::<V, R>(of[0], at), advecting.load::<V, R>(of[1], at));
             product = q.mul_add(c, product);
             square = c.mul_add(c, q.mul_add(q, square));
         }
         [product, square]
+    }
+}
+
+impl Slope {
+    #[inline(always)]
+    fn load<V: Vector<Number = f64>, R: Real>(&self, values: &[R], at: usize) -> V {
+        let [a, b, c, d] = self.faces.load::<V, R>(values, at);
+        ((a + b) - (c + d)).mul_add(V::constant(self.factor), V::constant(-self.rigid))
     }
 }
 
