@@ -6,7 +6,7 @@
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
 //! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `memory`, `meter`,
-//! `threads`, `plan`, `error`, `number_format`.
+//! `queue`, `threads`, `plan`, `error`, `number_format`.
 
 pub mod case;
 mod contact_events;
@@ -18,6 +18,7 @@ mod meter;
 pub mod number_format;
 mod overlaps;
 mod plan;
+pub mod queue;
 mod recorder;
 mod recording;
 mod run_folder;

@@ -1,14 +1,14 @@
 //! The runs of the validations, several at once.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use grainwake_run::case::Case;
-use grainwake_run::{Ending, Existing, Observer, Options, RunError};
+use grainwake_run::{Ending, Existing, Observer, Options, RunError, queue};
 use grainwake_validation::{Suite, SuiteRun};
 
 use crate::args::ValidateArgs;
@@ -32,56 +32,58 @@ pub fn execute(
     args: &ValidateArgs,
     runs: &[ChosenRun],
     stop: &Arc<AtomicBool>,
-    mut ended: impl FnMut(&ChosenRun, Result<(), String>),
+    ended: impl FnMut(&ChosenRun, Result<(), String>) + Send,
 ) -> Result<(), Exit> {
     let (jobs, threads) = match args.jobs.min(runs.len()) {
         0 | 1 => (1, threads::resolve(args.threads)),
         jobs => threads::share(jobs, args.threads),
     };
-    let next = AtomicUsize::new(0);
-    let (sender, receiver) = mpsc::channel();
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || {
-                while let Some((n, run)) = next_of(runs, next) {
-                    let execute = || execute_one(args, run, threads, jobs > 1, stop);
-                    let ending = catch_unwind(AssertUnwindSafe(execute)).unwrap_or_else(|panic| {
-                        stop.store(true, Ordering::Relaxed);
-                        resume_unwind(panic)
-                    });
-                    let is_last = ending.is_err();
-                    let sent = sender.send((n, ending));
-                    if is_last {
-                        // After the message, which thus comes before those of the other runs.
-                        stop.store(true, Ordering::Relaxed);
-                    }
-                    if is_last || sent.is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        let (mut waiting, mut following) = (BTreeMap::new(), 0);
-        for (n, ending) in receiver {
-            waiting.insert(n, ending?);
-            while let Some(ending) = waiting.remove(&following) {
-                ended(&runs[following], ending);
-                following += 1;
+    let done = Mutex::new(InOrder { runs, ended, waiting: BTreeMap::new(), following: 0 });
+    let failure = Mutex::new(None);
+    queue::for_each(jobs, runs, |_, n, run| {
+        let execute = || execute_one(args, run, threads, jobs > 1, stop);
+        let ending = catch_unwind(AssertUnwindSafe(execute)).unwrap_or_else(|panic| {
+            stop.store(true, Ordering::Relaxed);
+            resume_unwind(panic)
+        });
+        match ending {
+            Ok(ending) => {
+                locked(&done).add(n, ending);
+                ControlFlow::Continue(())
+            }
+            Err(exit) => {
+                // The first one; those of the other runs follow from it.
+                locked(&failure).get_or_insert(exit);
+                stop.store(true, Ordering::Relaxed);
+                ControlFlow::Break(())
             }
         }
-        Ok(())
-    })
+    });
+    locked(&failure).take().map_or(Ok(()), Err)
 }
 
-/// Takes the next run of the list with its index.
-fn next_of<'a, 'b>(
-    runs: &'a [ChosenRun<'b>],
-    next: &AtomicUsize,
-) -> Option<(usize, &'a ChosenRun<'b>)> {
-    let n = next.fetch_add(1, Ordering::Relaxed);
-    runs.get(n).map(|run| (n, run))
+/// Passes the endings of runs on in the order of the runs.
+struct InOrder<'a, F> {
+    runs: &'a [ChosenRun<'a>],
+    ended: F,
+    /// Endings of runs that follow one still in progress.
+    waiting: BTreeMap<usize, Result<(), String>>,
+    following: usize,
+}
+
+impl<F: FnMut(&ChosenRun, Result<(), String>)> InOrder<'_, F> {
+    fn add(&mut self, n: usize, ending: Result<(), String>) {
+        self.waiting.insert(n, ending);
+        while let Some(ending) = self.waiting.remove(&self.following) {
+            (self.ended)(&self.runs[self.following], ending);
+            self.following += 1;
+        }
+    }
+}
+
+/// Locks a value, also after a panic of another run.
+fn locked<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
+    value.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Executes one run, with its progress unless there are `others` at the same time. The outer error

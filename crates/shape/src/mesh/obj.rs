@@ -6,13 +6,15 @@ use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
 use std::io::Cursor;
 use std::path::Path;
+use tobj::LoadError;
 
 pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
-        .map_err(|e| ShapeError::malformed(path, e))?;
+    let mut text = Cursor::new(bytes);
+    let (models, _) = tobj::load_obj_buf(&mut text, &options, no_materials)
+        .map_err(|error| ShapeError::malformed(path, described(error, &text)))?;
     let mut mesh = TriangleMesh::default();
     let mut face = 0;
     for model in models {
@@ -33,4 +35,44 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
         }
     }
     Ok(mesh)
+}
+
+/// Describes an error that ended the reading of `text`, with its line if that is known.
+fn described(error: LoadError, text: &Cursor<Vec<u8>>) -> String {
+    let what = match error {
+        LoadError::ReadError => "the file is not text in UTF-8",
+        LoadError::PositionParseError => "expected three numbers after \"v\"",
+        LoadError::ColorParseError => "expected three, four or six numbers after \"v\"",
+        LoadError::ScalingByZeroError => "the fourth number after \"v\" must not be zero",
+        LoadError::NormalParseError => "expected three numbers after \"vn\"",
+        LoadError::TexcoordParseError => "expected two numbers after \"vt\"",
+        LoadError::FaceParseError => "expected the numbers of vertices after \"f\"",
+        LoadError::FaceVertexOutOfBounds => return missing_vertex(text.get_ref()),
+        // Found at the end of an object, or not related to a line.
+        other => return other.to_string(),
+    };
+    let read = &text.get_ref()[..text.position() as usize];
+    // The line that was read last; its line ending belongs to it.
+    let number = read.split_inclusive(|byte| *byte == b'\n').count();
+    format!("line {number}: {what}")
+}
+
+/// Describes the first face with a vertex that the file does not have.
+fn missing_vertex(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let count = text.lines().filter(|line| line.trim_start().starts_with("v ")).count();
+    let is_missing = |corner: &str| {
+        let number = corner.split('/').next().and_then(|number| number.parse::<i64>().ok());
+        number.is_some_and(|n| n == 0 || n.unsigned_abs() > count as u64)
+    };
+    let place = text.lines().enumerate().find_map(|(n, line)| {
+        let mut corners = line.trim_start().strip_prefix("f ")?.split_whitespace();
+        corners.find(|corner| is_missing(corner)).map(|corner| (n + 1, corner))
+    });
+    match place {
+        Some((n, corner)) => {
+            format!("line {n}: vertex {corner} does not exist; the file has {count}")
+        }
+        None => format!("a face has a vertex that does not exist; the file has {count}"),
+    }
 }

@@ -271,6 +271,30 @@ fn damaged_files_are_refused() {
 }
 
 #[test]
+fn errors_of_obj_files_have_their_line() {
+    let folder = Folder::new();
+    let vertices = "# a tetrahedron\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    let faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    let (bad_vertex, bad_face) =
+        (format!("{vertices}v 1 x 0\n{faces}"), |face: &str| format!("{vertices}{faces}{face}\n"));
+    for (text, expected) in [
+        (bad_vertex, "line 6: expected three numbers after \"v\""),
+        (bad_face("v 1 2"), "line 10: expected three numbers after \"v\""),
+        (bad_face("v 0 0 1 0"), "line 10: the fourth number after \"v\" must not be zero"),
+        (bad_face("vn 1 2"), "line 10: expected three numbers after \"vn\""),
+        (bad_face("f 1 2 three"), "line 10: expected the numbers of vertices after \"f\""),
+        (bad_face("f 1 2 9"), "line 10: vertex 9 does not exist; the file has 4"),
+        (bad_face("f 1/1 2/2 7/3"), "line 10: vertex 7/3 does not exist; the file has 4"),
+    ] {
+        let message = folder.refusal("a.obj", text.as_bytes());
+        assert!(message.contains(expected), "{message}");
+    }
+    let not_text = [vertices.as_bytes(), b"v 0 \xff 0\n"].concat();
+    let message = folder.refusal("a.obj", &not_text);
+    assert!(message.contains("line 6: the file is not text"), "{message}");
+}
+
+#[test]
 fn absurd_headers_are_refused() {
     let folder = Folder::new();
     let mut bytes = stl(&ball(4, DVec3::ZERO));

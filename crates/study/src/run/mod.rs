@@ -3,7 +3,7 @@
 pub mod state;
 pub mod step_time;
 
-use std::collections::VecDeque;
+use std::ops::ControlFlow;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Mutex;
@@ -14,7 +14,7 @@ use grainwake_formats::events::Event;
 use grainwake_formats::summary::Summary;
 use grainwake_run::checkpoint;
 use grainwake_run::lock::{self, Attempt};
-use grainwake_run::{Ending, Existing, FailureKind, Observer, Progress, RunError};
+use grainwake_run::{Ending, Existing, FailureKind, Observer, Progress, RunError, queue};
 
 use self::state::{Archive, RunState, run_state};
 use crate::error::{At, StudyError};
@@ -85,32 +85,25 @@ pub fn execute(
 ) -> Result<Vec<(usize, Outcome)>, StudyError> {
     let jobs = options.jobs.clamp(1, chosen.len().max(1));
     let pools = pools(jobs, options.threads).at("start threads for", study)?;
-    let queue: Mutex<VecDeque<usize>> = Mutex::new(chosen.iter().copied().collect());
     let ended: Mutex<Vec<(usize, Outcome)>> = Mutex::new(Vec::new());
     let disk_full = AtomicBool::new(false);
     let archive = Archive::read(study)?;
-    let work = |pool: &rayon::ThreadPool| {
-        while let Some(index) = queue.lock().ok().and_then(|mut queue| queue.pop_front()) {
-            let job = Job { run: &runs[index], index, study, archive: &archive, options, observer };
-            let outcome = if observer.interrupted() || disk_full.load(Ordering::Relaxed) {
-                Outcome::Interrupted
-            } else {
-                let guarded = AssertUnwindSafe(|| pool.install(|| job.outcome(&disk_full)));
-                std::panic::catch_unwind(guarded).unwrap_or_else(|_| {
-                    let what = "internal error of the program: please report it with the case";
-                    Outcome::Failed(what.into(), FailureKind::Computation)
-                })
-            };
-            observer.ended(index, &outcome);
-            if let Ok(mut ended) = ended.lock() {
-                ended.push((index, outcome));
-            }
+    queue::for_each(jobs, chosen, |pool, _, &index| {
+        let job = Job { run: &runs[index], index, study, archive: &archive, options, observer };
+        let outcome = if observer.interrupted() || disk_full.load(Ordering::Relaxed) {
+            Outcome::Interrupted
+        } else {
+            let guarded = AssertUnwindSafe(|| pools[pool].install(|| job.outcome(&disk_full)));
+            std::panic::catch_unwind(guarded).unwrap_or_else(|_| {
+                let what = "internal error of the program: please report it with the case";
+                Outcome::Failed(what.into(), FailureKind::Computation)
+            })
+        };
+        observer.ended(index, &outcome);
+        if let Ok(mut ended) = ended.lock() {
+            ended.push((index, outcome));
         }
-    };
-    std::thread::scope(|scope| {
-        for pool in &pools {
-            scope.spawn(|| work(pool));
-        }
+        ControlFlow::Continue(())
     });
     let mut ended = ended.into_inner().unwrap_or_default();
     ended.sort_by_key(|(index, _)| *index);
