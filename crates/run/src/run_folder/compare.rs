@@ -52,7 +52,10 @@ pub fn differing(folder: &Path, resolved: &str) -> String {
         .map(|key| format!("{key}: {} there, {} here", side(&there, key), side(&here, key)))
         .collect();
     match differ.len() {
-        0 => "a grain file has other contents, or another version of the program wrote it".into(),
+        0 => format!(
+            "{RESOLVED} was edited, a grain file has other contents, or another version of the \
+             program wrote it"
+        ),
         n if n > MAX_NAMED => {
             format!("{}; and {} more", differ[..MAX_NAMED].join("; "), n - MAX_NAMED)
         }
