@@ -1291,6 +1291,38 @@ fn whole_numbers_of_steps_lead_to_each_output() {
     assert!((estimate.time_step_s - 0.5 * interval).abs() < 1e-12, "{}", estimate.time_step_s);
 }
 
+/// A default interval slightly longer than a step would halve the steps.
+#[test]
+fn default_outputs_hardly_shorten_the_steps() {
+    let case = |end: &str, output: &str| {
+        let text = format!("{}\n[output]\n{output}", PAIR.replacen("\"1 s\"", end, 1));
+        good(&text)
+    };
+    let whole = |ratio: f64| (ratio - ratio.round()).abs() < 1e-9 && ratio > 0.5;
+    for end in ["0.02", "0.1", "0.3", "0.5", "1", "3"] {
+        let [plain, free] = ["", "tables = 0\nslices = 0\nsurfaces = 0"]
+            .map(|output| case(end, output).estimate(1).time_step_s);
+        assert!(plain > 0.74 * free, "{end}: {plain} instead of {free}");
+        let plan = case(end, "").job().plan;
+        assert!(whole(plan.slices / plan.tables) && plan.surfaces == plan.slices, "{end}");
+        let plan = case(end, "tables = \"3 ms\"").job().plan;
+        assert!(whole(plan.slices / 3e-3), "{end}: {}", plan.slices);
+    }
+    let plan = case("10", "").job().plan;
+    assert_eq!((plan.tables, plan.slices), (0.025, 0.25));
+}
+
+#[test]
+fn a_single_free_grain_between_walls_has_contact_time() {
+    let second = PAIR.rfind("[[grain]]").unwrap();
+    let times =
+        |change: &str| good(&PAIR[..second].replacen("density = \"1500", change, 1)).estimate(1);
+    let free = times("density = \"1500");
+    assert!(free.contact_time_s.is_some() && free.contact_substeps.is_some());
+    let held = times("motion = \"fixed\"\ndensity = \"1500");
+    assert!(held.contact_time_s.is_none());
+}
+
 #[test]
 fn prescribed_motions_count_in_the_expected_step() {
     let moved_with = |motion: &str, time: &str| {

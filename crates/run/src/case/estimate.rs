@@ -239,14 +239,17 @@ fn shortest_axis(setup: &Setup) -> f64 {
     extents.fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the shortest contact time of two equal grains [s].
+/// Returns the shortest contact time of two equal grains [s]; none for a single grain that is held
+/// or has no walls around it.
 fn contact_time(setup: &Setup) -> Option<f64> {
+    let walls = setup.boundaries.0.iter().flatten().any(Boundary::is_solid);
+    let touches = setup.grains.len() > 1 || walls && setup.grains.iter().any(is_free);
     let of = |grain: &Grain| {
         let speed = impact_speed(grain, setup.fluid.as_ref(), setup.gravity, &setup.mesh);
         setup.contact.contact_time(grain, speed)
     };
     let times = setup.grains.iter().map(of);
-    (times.reduce(f64::min)).filter(|time| setup.grains.len() > 1 && time.is_finite())
+    times.reduce(f64::min).filter(|time| touches && time.is_finite())
 }
 
 /// Returns the cross-section of the largest grain over that of the box, normal to gravity.

@@ -57,6 +57,24 @@ pub(super) fn step(
     Some(StepRule::Limits { cfl: cfl?, viscous: viscous?, max_step: max_step? })
 }
 
+/// Mean step over that which the limits allow at the expected settling speed: the flow beside a
+/// grain may be faster.
+const EXPECTED_STEP: f64 = 0.8;
+/// Number of steps from which a step more or less in an interval of the tables does not matter.
+const MANY_STEPS: f64 = 5.0;
+
+/// Returns the default interval of the tables [s]. One that is slightly longer than a step would
+/// halve the steps.
+fn default_tables(end: f64, step: f64) -> f64 {
+    let interval = end / 400.0;
+    if interval < MANY_STEPS * step { multiple_of(step, interval) } else { interval }
+}
+
+/// Returns the multiple of `unit` that is nearest to `value`, at least one; `value` if `unit` is 0.
+fn multiple_of(unit: f64, value: f64) -> f64 {
+    if unit > 0.0 { unit * (value / unit).round().max(1.0) } else { value }
+}
+
 /// Returns the run plan and writes the intervals that are not given.
 pub(super) fn plan(
     check: &mut Checker,
@@ -88,10 +106,9 @@ pub(super) fn plan(
     let settled = settled_time_step(setup);
     let by_limits = matches!(setup.step, StepRule::Limits { .. }) && !dry;
     let smallest_step = if by_limits { SMALLEST_STEP * settled } else { 0.0 };
-    // Default outputs do not shorten the steps.
-    let step = settled.min(end);
-    let coarse = (end / 40.0).max(step);
-    let tables = interval(&mut raw.tables, (end / 400.0).max(step));
+    let step = if by_limits { EXPECTED_STEP * settled } else { settled };
+    let tables = interval(&mut raw.tables, default_tables(end, step.min(end)));
+    let coarse = multiple_of(tables, (end / 40.0).max(tables));
     let slices = interval(&mut raw.slices, if dry { 0.0 } else { coarse });
     let surfaces = if slices > 0.0 { slices } else { coarse };
     let surfaces = interval(&mut raw.surfaces, surfaces);
