@@ -12,9 +12,6 @@ use grainwake_solver::sim::{Prescription, Setup, StepRule};
 
 use super::time_scale::{resolved_step, spread_times};
 
-/// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
-/// At a tenth of this ratio some grains become unstable.
-pub(super) const LIGHTEST_FREE: f64 = 0.01;
 /// Largest density of a grain [kg/m3].
 pub(super) const HEAVIEST: f64 = 1e9;
 

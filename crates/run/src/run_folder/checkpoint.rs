@@ -28,7 +28,7 @@ use crate::number_format::quantity;
 use crate::overlaps::Overlaps;
 
 const SIGNATURE: &[u8; 8] = b"GWCKPT\r\n";
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 const CHECKSUM: u64 = 32;
 /// Folder of the checkpoints in a run folder.
 pub const FOLDER: &str = "checkpoint";

@@ -27,7 +27,7 @@ const MERGED_PER_SQUARE: f64 = 1.3;
 /// Numbers of the state per cell, ghosts included.
 const NUMBERS_PER_CELL: f64 = 7.0;
 /// Bytes of the state of a grain with few contacts.
-const BYTES_PER_GRAIN: f64 = 350.0;
+const BYTES_PER_GRAIN: f64 = 400.0;
 
 /// Returns the size of the outputs of a run that ends at `end` [s], and of its grain files of
 /// `grain_files` bytes.

@@ -48,7 +48,7 @@ use crate::grid::Mesh;
 use crate::math::Real;
 use grainwake_simd::{Kernel, Stencil, Vector, dispatch};
 
-/// Largest Reynolds number |(1/A - 1) (c - U_c)| h / nu of the first term.
+/// Largest Reynolds number |(1/A' - 1) (c - U_c)| h / nu of the first term.
 pub const LARGEST_EXCESS: f64 = 100.0;
 
 /// Part of the flux that averages over the band leave out, which the third term adds.
@@ -171,7 +171,7 @@ struct LinkAxis {
     slopes: LinkSlopes,
     /// 1 / h [1/m].
     per_spacing: f64,
-    /// Largest |(1/A - 1) (c - U_c)| [m/s].
+    /// Largest |(1/A' - 1) (c - U_c)| [m/s].
     largest_excess: f64,
 }
 
@@ -318,7 +318,7 @@ impl<'a, R: Real> ComponentLinks<'a, R> {
         let higher_order = index.select_below(V::constant(end), higher_order, zero);
         let higher_order = index.select_below(V::constant(start), zero, higher_order);
         let mut flux = higher_order;
-        // Links outside the band are open: 1/A - 1 is zero.
+        // Links outside the band are open: 1/A' - 1 is zero.
         if zero.mask_below(weight) != 0 {
             let [change_q, change_c] = self.rigid.change[0][along].map(V::constant);
             let u_q = index.mul_add(change_q, V::constant(u_q));

@@ -2,11 +2,11 @@
 //! their rigid velocities, slopes of the velocity at them, and the velocity in the box around the
 //! grain.
 //!
-//! The weight of a link is 1 / A - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere, which
-//! marks links without correction. `immersed::reference` has the scalar form.
+//! The weight of a link is 1 / A' - 1 for |d| < eps, 0 for eps <= d < 2 eps, and -1 elsewhere,
+//! which marks links without correction. `immersed::reference` has the scalar form.
 //!
 //! Legend: d signed distance of a link, the mean of the distances of its two faces; eps half-width
-//! of the band; A aperture at d.
+//! of the band; A' limited aperture at d.
 
 use std::ops::Range;
 

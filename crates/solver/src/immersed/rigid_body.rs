@@ -21,8 +21,11 @@ use crate::math::{Load, Matrix6, RigidVelocity, Vector6, multiply6, solve6};
 /// State that a grain carries over from the previous step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PreviousStep {
-    /// Velocities at the start of the step.
+    /// Velocities at the end of the previous step, which the forced faces have.
     pub velocity: RigidVelocity,
+    /// Change of the velocities between the steps, by control of the grain. The grain has its
+    /// momentum, the displaced fluid does not.
+    pub set_change: RigidVelocity,
     /// Mean acceleration over the previous step [m/s^2, rad/s^2], without `added_mass_uptake`; zero
     /// after contact, and extrapolated to the next step for a grain in a free surface.
     pub acceleration: RigidVelocity,
@@ -38,6 +41,17 @@ pub struct PreviousStep {
 }
 
 impl PreviousStep {
+    /// Velocities at the start of the step.
+    pub fn start_velocity(&self) -> RigidVelocity {
+        // Adding zero would turn -0.0 into 0.0.
+        if self.was_set() { self.velocity + self.set_change } else { self.velocity }
+    }
+
+    /// Returns whether a velocity was set between the steps.
+    pub fn was_set(&self) -> bool {
+        self.set_change != RigidVelocity::default()
+    }
+
     /// Returns whether contact in the previous step left a velocity that the added mass takes up in
     /// this step.
     pub fn has_pending_velocity(&self) -> bool {
@@ -101,12 +115,16 @@ impl RigidBodySystem {
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);
-        let RigidVelocity { linear: v, angular: omega } = previous.velocity;
+        let (old, omega) = (previous.velocity, previous.start_velocity().angular);
         let gyroscopic = omega.cross(inertia * omega);
         let virtual_mass = VirtualMass::new(grain, previous, fluid_density, surface.is_some(), dt);
-        let linear = mass * v + dt * applied.force + virtual_mass.momentum[0];
+        let mut linear = mass * old.linear + dt * applied.force + virtual_mass.momentum[0];
         let torque = applied.torque - gyroscopic;
-        let angular = inertia * omega + dt * torque + virtual_mass.momentum[1];
+        let mut angular = inertia * old.angular + dt * torque + virtual_mass.momentum[1];
+        if previous.was_set() {
+            linear += grain.mass() * previous.set_change.linear;
+            angular += grain.inertia() * previous.set_change.angular;
+        }
         let (mut a, mut b) = (impulse.matrix, [0.0; 6]);
         for row in 0..3 {
             a[row][row] += mass + virtual_mass.mass;
@@ -149,7 +167,7 @@ impl RigidBodySystem {
         }
         // Singular only if no face is forced; such a grain keeps its velocities.
         let x = solve6(self.matrix, right);
-        x.map_or(previous.velocity, |x| RigidVelocity::from_vector(&x))
+        x.map_or(previous.start_velocity(), |x| RigidVelocity::from_vector(&x))
     }
 
     /// Hydrodynamic load (Eq. 5) on the grain, which has its new velocities.
@@ -173,7 +191,7 @@ impl RigidBodySystem {
         let VirtualMass { mass, inertia, momentum } = self.virtual_mass;
         let force = DVec3::from_slice(&j[..3]) + mass * new.linear - momentum[0];
         let torque = DVec3::from_slice(&j[3..]) + inertia * new.angular - momentum[1];
-        let omega = previous.velocity.angular;
+        let omega = previous.start_velocity().angular;
         let displaced = fluid_density / grain.density;
         let fluid_inertia = grain.inertia() * displaced;
         let load = Load {
@@ -203,7 +221,7 @@ impl RigidBodySystem {
         added_density: f64,
         dt: f64,
     ) -> GrainResponse {
-        let start = previous.velocity - previous.pending_added_mass_velocity;
+        let start = previous.start_velocity() - previous.pending_added_mass_velocity;
         let free = free(grain);
         // Load that changes the initial velocities over dt, with the matrix before mass is added.
         let momentum = multiply6(&self.matrix, &start.to_vector());

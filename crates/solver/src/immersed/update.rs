@@ -85,7 +85,7 @@ impl GrainUpdate {
 pub struct CouplingInput<'a> {
     /// Grains at their new poses.
     pub grains: &'a [Grain],
-    /// Kinematics when the flow was predicted.
+    /// Poses at the start of the step, and the velocities that the known flow has there.
     pub kinematics: &'a [RigidState],
     /// State carried over from the previous step.
     pub previous: &'a [PreviousStep],

@@ -1,5 +1,7 @@
 //! Time-step control.
 
+use glam::DVec3;
+
 use super::{Setup, StepRule};
 
 /// Simulated time and time-step control.
@@ -14,13 +16,16 @@ pub(super) struct Clock {
     rule: StepRule,
     /// nu * sum 1/h_a^2 over the resolved axes [1/s]; zero without fluid.
     viscous_rate: f64,
-    /// Longest first step: from rest, gravity moves no grain by more than `cfl` cells in it [s].
+    /// Longest first step [s]: from rest, gravity or the body acceleration moves nothing by more
+    /// than `cfl` cells in it.
     first_step: f64,
 }
 
-/// Largest ratio of successive steps, since Adams-Bashforth extrapolates over the previous step;
-/// with one step fewer to the next output the ratio is up to 2.
+/// Largest ratio of successive steps within limits, since Adams-Bashforth extrapolates over the
+/// previous step; with one step fewer to the next output the ratio is up to 2.
 const MAX_GROWTH: f64 = 1.2;
+/// Largest ratio of successive steps on the way back to a fixed step from a shorter one.
+const MAX_RATIO: f64 = 2.0;
 /// Fraction of the stability limit up to which one step fewer to the next output is taken; this
 /// hysteresis keeps the number of steps from alternating.
 const HYSTERESIS: f64 = 0.95;
@@ -41,6 +46,7 @@ impl Clock {
             .iter()
             .map(|grain| setup.gravity.length() * (1.0 - fluid_density / grain.density).abs())
             .chain(setup.fluid.map(|fluid| fluid.body_acceleration.length()))
+            .chain(setup.prescription.body_acceleration(0.0).map(DVec3::length))
             .fold(0.0, f64::max);
         let first_step = match setup.step {
             StepRule::Limits { cfl, .. } if acceleration > 0.0 => {
@@ -64,7 +70,8 @@ impl Clock {
     /// now; `rate` is max(sum |u_a| / h_a) of the flow [1/s].
     pub fn next_step(&self, rate: f64, horizon: f64) -> f64 {
         let (largest, preferred) = match self.rule {
-            StepRule::Fixed(step) => (step, step),
+            StepRule::Fixed(step) if self.steps == 0 => (step, step),
+            StepRule::Fixed(step) => (step, step.min(MAX_RATIO * self.last_step)),
             StepRule::Limits { cfl, viscous, max_step } => {
                 let largest = (cfl / rate).min(viscous / self.viscous_rate).min(max_step);
                 let next =
@@ -101,6 +108,10 @@ impl Clock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flow::FluidParams;
+    use crate::grid::Mesh;
+    use crate::math::Formula;
+    use crate::sim::Prescription;
 
     /// Steps over an interval of 1 after a step of length `last`; none exceeds `largest`.
     fn interval(last: f64, largest: f64) -> Vec<f64> {
@@ -152,6 +163,38 @@ mod tests {
         let steps = interval(0.5, 0.11);
         assert_eq!(steps.len(), 10);
         assert!(steps.iter().all(|s| (s - 0.1).abs() < 1e-9), "{steps:?}");
+    }
+
+    /// A body acceleration limits the first step whether it is a constant or a formula.
+    #[test]
+    fn the_first_step_follows_the_body_acceleration() {
+        let first_step = |constant: f64, formula: Option<&str>| {
+            let mut fluid = FluidParams::new(1000.0, 1e-6);
+            fluid.body_acceleration.x = constant;
+            let parse = |x: &str| Formula::parse([x, "0", "0"].map(String::from), &["t"]).unwrap();
+            let body_acceleration = formula.map(parse);
+            let prescription = Prescription { body_acceleration, ..Prescription::default() };
+            let setup = Setup::new(Mesh::cubic([8; 3], 1e-3)).with_fluid(fluid);
+            Clock::new(&setup.with_prescription(prescription)).next_step(0.0, f64::INFINITY)
+        };
+        let constant = first_step(9.81, None);
+        assert!((constant - (0.4e-3_f64 / 9.81).sqrt()).abs() < 1e-12, "{constant}");
+        assert_eq!(first_step(0.0, Some("9.81 + t")), constant);
+        assert!(first_step(0.0, None) > 5.0 * constant);
+    }
+
+    #[test]
+    fn a_fixed_step_is_reached_again_by_doubling() {
+        let mut clock =
+            Clock::new(&Setup::new(Mesh::cubic([8; 3], 1e-3)).with_step(StepRule::Fixed(0.1)));
+        let steps: Vec<f64> = [0.2, 0.01, f64::INFINITY, f64::INFINITY]
+            .map(|horizon| {
+                let step = clock.next_step(0.0, horizon);
+                clock.advance(step, horizon);
+                step
+            })
+            .into();
+        assert_eq!(steps, [0.1, 0.01, 0.02, 0.04]);
     }
 
     #[test]

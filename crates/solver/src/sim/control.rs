@@ -72,8 +72,8 @@ impl MotionComponent {
 }
 
 impl Simulation {
-    /// Sets the present velocity of a free grain: [m/s] or [rad/s], space frame. The fluid receives
-    /// the change as an impulse in the next step.
+    /// Sets the present velocity of a free grain: [m/s] or [rad/s], space frame. The grain gets the
+    /// momentum of the change, and shares it with its added mass in the next step, as after a blow.
     ///
     /// # Errors
     /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite

@@ -41,7 +41,7 @@ pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
 pub use refinement::LEAST_REFINEMENT_MARGIN;
 pub use sample::{PlaneSample, PointSample};
-pub use setup::{Setup, SetupError, StepRule};
+pub use setup::{LIGHTEST_FREE_GRAIN, Setup, SetupError, StepRule};
 pub use step::SAME_TIME;
 
 /// Simulation of grains in a fluid, or of grains alone.
@@ -69,7 +69,7 @@ struct StepData {
     /// Mean hydrodynamic loads over the last step; zero without fluid.
     loads: Vec<Load>,
     previous: Vec<PreviousStep>,
-    /// At the start of the step; prescribed velocities are those of the step.
+    /// Poses at the start of the step, and the velocities that the fluid has there.
     kinematics: Vec<RigidState>,
     /// Loads set between steps.
     external: Vec<Load>,
@@ -92,13 +92,15 @@ impl StepData {
         // With fluid the equations of the grains contain the damping (`Start::prepare`).
         let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
         let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
+        let at_rest =
+            |grain: &Grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() };
         StepData {
             dynamics: ContactDynamics::new(contact, setup.enclosure()),
             open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, grains),
             times: PassTimes::default(),
             momentum_residual: DVec3::ZERO,
             loads: vec![Load::default(); count],
-            previous: vec![PreviousStep::default(); count],
+            previous: grains.iter().map(at_rest).collect(),
             kinematics: grains.iter().map(RigidState::of).collect(),
             external: vec![Load::default(); count],
             applied: vec![Load::default(); count],

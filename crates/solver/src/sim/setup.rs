@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dem::{ContactParams, Enclosure, Grain, Side};
+use crate::dem::{ContactParams, Enclosure, Grain, MotionConstraint, Side};
 use crate::flow::{Boundaries, Boundary, FluidParams, RefinedBox};
 use crate::grid::Mesh;
 use crate::immersed::{Scheme, Start};
@@ -10,6 +10,10 @@ use crate::math::Precision;
 
 use super::Prescription;
 use super::refinement::box_around;
+
+/// Smallest density ratio of a free grain and the fluid, tested for spheres, flat and long grains.
+/// At a tenth of this ratio some grains become unstable.
+pub const LIGHTEST_FREE_GRAIN: f64 = 0.01;
 
 /// Rule for the length of the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -240,6 +244,15 @@ impl Setup {
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));
         }
+        if let Some(i) = self.too_light_grain() {
+            return fail(format!(
+                "grain {i} is lighter than {LIGHTEST_FREE_GRAIN} times the fluid: free grains \
+                 become unstable below it; prescribe its velocity, or take a denser grain"
+            ));
+        }
+        if sides().filter(|side| **side == Boundary::FreeSurface).count() > 1 {
+            return fail("the box can have one free surface, not several".into());
+        }
         if self.refinement != 1 {
             let flat = (0..3).any(|axis| !self.mesh.is_resolved(axis));
             if self.refinement != 2 {
@@ -268,6 +281,19 @@ impl Setup {
             return fail("the time step must be positive and, without a fluid, finite".into());
         }
         Ok(())
+    }
+}
+
+impl Setup {
+    /// Index of the first free grain that is too light for the coupling.
+    fn too_light_grain(&self) -> Option<usize> {
+        let least = LIGHTEST_FREE_GRAIN * self.fluid?.density;
+        let motions = &self.prescription.motions;
+        let by_formula = |i| motions.iter().any(|m| m.grain == i && m.velocity.is_some());
+        self.grains.iter().enumerate().position(|(i, grain)| {
+            let is_free = grain.translation == MotionConstraint::Free && !by_formula(i);
+            is_free && grain.density < least
+        })
     }
 }
 

@@ -62,7 +62,6 @@ impl<'a> Start<'a> {
         for (i, grain) in setup.grains.iter().enumerate() {
             let crossing =
                 data.open_sides.as_ref().map_or(&Crossing::Inside, |o| &o.crossings()[i]);
-            data.previous[i].velocity = grain.rigid_velocity();
             // Weight less buoyancy.
             let force = setup.gravity * (grain.density - fluid_density) * grain.shape.volume();
             data.applied[i] = Load { force, torque: DVec3::ZERO };
@@ -84,15 +83,19 @@ impl<'a> Start<'a> {
                 data.applied[i] += damping_load(grain, setup.contact.global_damping, dt);
             }
         }
+        if fluid.is_some() {
+            for (i, grain) in setup.grains.iter().enumerate() {
+                let previous = &mut data.previous[i];
+                previous.set_change = grain.rigid_velocity() - previous.velocity;
+                data.kinematics[i] = RigidState { pose: grain.pose, velocity: previous.velocity };
+            }
+        }
         let time = clock.time;
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.
         setup.prescription.prescribe_motion(&mut setup.grains, time + 0.5 * dt);
         let Some(fluid) = fluid.as_deref_mut() else {
             return Start::Dry(GrainContext { setup, data, time, dt });
         };
-        for (kinematics, grain) in data.kinematics.iter_mut().zip(&setup.grains) {
-            *kinematics = RigidState::of(grain);
-        }
         if let Some(acceleration) = setup.prescription.body_acceleration(time) {
             fluid.set_body_acceleration(acceleration);
         }
@@ -262,15 +265,18 @@ impl Projected<'_> {
             if let (Some(Crossing::Departing(normals, _)), Some(fluid)) = (crossing, &setup.fluid) {
                 *load = departing_load(*load, grain, *normals, previous.velocity, fluid);
             }
-            // The acceleration of an impact does not continue in the next step; its added mass
-            // does.
+            // The acceleration of an impact, or of a velocity that was set, does not continue in
+            // the next step; the added mass of an impact does.
             let taken_up = previous.pending_added_mass_velocity;
             previous.added_mass_uptake = taken_up / dt;
             (previous.acceleration, previous.pending_added_mass_velocity) = if touched {
                 (RigidVelocity::default(), beyond_substeps(grain, &data.ends[i]))
+            } else if previous.was_set() {
+                Default::default()
             } else {
                 ((change + taken_up) / dt, RigidVelocity::default())
             };
+            previous.velocity = grain.rigid_velocity();
         }
         data.momentum_residual = residual;
     }

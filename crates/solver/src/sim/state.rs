@@ -33,6 +33,7 @@ impl Simulation {
             save_rates(previous.pending_added_mass_velocity, &mut out)?;
             save_rates(previous.added_mass_uptake, &mut out)?;
             out.vector(previous.change)?;
+            save_rates(previous.velocity, &mut out)?;
         }
         if let Some(fluid) = &self.fluid {
             out.vector(self.data.momentum_residual)?;
@@ -71,6 +72,7 @@ impl Simulation {
             previous.pending_added_mass_velocity = restore_rates(&mut input)?;
             previous.added_mass_uptake = restore_rates(&mut input)?;
             previous.change = input.vector()?;
+            previous.velocity = restore_rates(&mut input)?;
         }
         if let Some(fluid) = &mut self.fluid {
             data.momentum_residual = input.vector()?;

@@ -20,7 +20,9 @@ impl Simulation {
 
     /// Advances the simulation by one time step. Its length is chosen by the
     /// [`StepRule`](super::StepRule) and such that a whole number of equal steps ends `horizon` [s]
-    /// from now, which makes output times exact; an infinite horizon imposes no such condition.
+    /// from now, which makes output times exact; an infinite horizon imposes no such condition. A
+    /// horizon below a thousandth of the last step disturbs the pressure and the loads for some
+    /// steps: the velocity that the last step left in the grains is removed in a shorter time.
     ///
     /// # Panics
     /// If `horizon` is not positive.

@@ -66,11 +66,14 @@ fn contradictions_in_a_set_up_are_named() {
     let motion = PrescribedMotion { grain: 2, velocity: None, angular_velocity: None };
     let prescription = Prescription { motions: vec![motion], ..Prescription::default() };
     let setup = || two_grains(Precision::Double);
+    let (periodic, surface) = ([Boundary::Periodic; 2], [Boundary::WALL, Boundary::FreeSurface]);
     let bad = [
         (setup().with_prescription(prescription), "grain 2"),
         (setup().with_step(StepRule::Fixed(0.0)), "time step"),
         (setup().with_fluid(None).with_step(StepRule::default()), "without a fluid"),
         (setup().with_fluid(FluidParams::new(0.0, 1.0)), "density"),
+        (setup().with_fluid(FluidParams::new(201.0, 1.0)), "grain 0 is lighter"),
+        (setup().with_boundaries([periodic, surface, surface]), "one free surface"),
     ];
     for (setup, word) in bad {
         let message = Simulation::new(setup).err().expect(word).to_string();

@@ -49,6 +49,28 @@ fn a_colliding_cloud_keeps_momentum_and_angular_momentum() {
     assert!(kinetic(&grains) < 0.9 * energy, "friction and dashpots take energy");
 }
 
+/// A step in which the grain turns by two radians is taken in sub-steps.
+#[test]
+fn a_tumbling_ellipsoid_keeps_angular_momentum_and_energy_in_long_steps() {
+    let shape =
+        grainwake_shape::analytic::ellipsoid(3e-3, 2e-3, 1.5e-3, &Default::default()).unwrap();
+    let spin = DVec3::new(0.1, 20.0, 0.05);
+    let grain = Grain::new(shape, 2600.0).with_angular_velocity(spin);
+    let mut grains = vec![grain.with_position(DVec3::splat(0.5))];
+    let mut dynamics = ContactDynamics::new(ContactParams::default(), open_box(1.0));
+    let (before, energy) = (momenta(&grains).1, kinetic(&grains));
+    let mut turned = false;
+    for _ in 0..100 {
+        step(&mut dynamics, &mut grains, DVec3::ZERO, 0.1);
+        let own = grains[0].pose.orientation.conjugate() * grains[0].angular_velocity;
+        turned |= own.y < -10.0;
+    }
+    let change = (momenta(&grains).1 - before).length() / before.length();
+    assert!(change < 2e-3, "{change:e}");
+    assert!((kinetic(&grains) / energy - 1.0).abs() < 1e-3, "{}", kinetic(&grains) / energy - 1.0);
+    assert!(turned, "the rotation about the intermediate axis is unstable");
+}
+
 #[test]
 fn elastic_collisions_keep_the_energy() {
     let mut grains = cloud(60, 0.05, 0.008, 0.3, 11);

@@ -11,11 +11,11 @@ use crate::case::located::{Located, Span};
 use crate::case::placement::{extent_along, orientation};
 use crate::case::quantity::{Density, Kind, Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawGrain, Turns};
-use crate::case::settling::{HEAVIEST, LIGHTEST_FREE};
+use crate::case::settling::HEAVIEST;
 use crate::case::shapes::{DEFAULT_NODES, Library};
 use crate::number_format::{AXES, number, quantity, vector};
 use grainwake_solver::dem::{Grain, MotionConstraint};
-use grainwake_solver::sim::PrescribedMotion;
+use grainwake_solver::sim::{LIGHTEST_FREE_GRAIN, PrescribedMotion};
 
 /// Vertical axis, and the sign of the upward direction along it.
 #[derive(Clone, Copy)]
@@ -196,19 +196,19 @@ pub(super) fn not_too_light(
     fluid_density: Option<f64>,
 ) {
     // A density that is not positive is refused elsewhere.
-    let too_light = |fluid: &f64| density.si > 0.0 && density.si < LIGHTEST_FREE * fluid;
+    let too_light = |fluid: &f64| density.si > 0.0 && density.si < LIGHTEST_FREE_GRAIN * fluid;
     let Some(fluid) = fluid_density.filter(too_light) else {
         return;
     };
-    let least = quantity(LIGHTEST_FREE * fluid, "kg/m3");
+    let least = quantity(LIGHTEST_FREE_GRAIN * fluid, "kg/m3");
     let mut help = format!(
-        "accepted: at least {LIGHTEST_FREE} times the fluid's density, {least}, or a grain whose velocity is prescribed (motion)"
+        "accepted: at least {LIGHTEST_FREE_GRAIN} times the fluid's density, {least}, or a grain whose velocity is prescribed (motion)"
     );
     if density.si < 30.0 && check.is_bare(check.key(&density.span)) {
         help.push_str("; without a unit it is in kg/m3: was \"g/cm3\" forgotten?");
     }
     let message = format!(
-        "{} is {} times the density of the fluid: below {LIGHTEST_FREE} times it, free grains become unstable in this coupling",
+        "{} is {} times the density of the fluid: below {LIGHTEST_FREE_GRAIN} times it, free grains become unstable in this coupling",
         quantity(density.si, "kg/m3"),
         number(density.si / fluid)
     );

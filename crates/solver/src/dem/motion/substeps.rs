@@ -20,6 +20,11 @@ const MOTION_MARGIN: f64 = 1.01;
 const SKIN: f64 = 0.01;
 /// Number of pairs below which the evaluation stays on one thread.
 const PARALLEL_PAIRS: usize = 16;
+/// Largest angle by which a free grain turns in a sub-step [rad]. At 8 cells per diameter the CFL
+/// number limits steps with fluid to this angle.
+const LARGEST_TURN: f64 = 0.1;
+/// Largest number of sub-steps for the spin of grains in a step.
+const MAX_TURNS: f64 = 1e3;
 /// Largest number of sub-steps in a step; more indicate an error in the input.
 const MAX_SUBSTEPS: f64 = 1e7;
 
@@ -41,7 +46,7 @@ impl ContactDynamics {
         let damping = self.model.params.global_damping;
         self.compute_contacts(grains, 0.0);
         let (mut done, mut time_left) = (0, dt);
-        let mut substeps_left = self.substeps_for(time_left);
+        let mut substeps_left = self.substeps_for(grains, time_left);
         while substeps_left > 0 {
             let step = time_left / substeps_left as f64;
             let half_mean = 0.5 * step / dt;
@@ -55,7 +60,7 @@ impl ContactDynamics {
             if self.pair_list_expired(grains) {
                 self.search_pairs(grains, time_left.max(step));
                 if substeps_left > 0 {
-                    substeps_left = self.substeps_for(time_left);
+                    substeps_left = self.substeps_for(grains, time_left);
                 }
             }
             self.compute_contacts(grains, step);
@@ -110,8 +115,18 @@ impl ContactDynamics {
         })
     }
 
-    /// Number of sub-steps for `dt` [s], from the shortest contact time of the listed pairs.
-    fn substeps_for(&self, dt: f64) -> usize {
+    /// Number of sub-steps for `dt` [s], from the shortest contact time of the listed pairs and the
+    /// fastest spin.
+    fn substeps_for(&self, grains: &[Grain], dt: f64) -> usize {
+        let turning = grains.iter().filter(|grain| grain.rotation == MotionConstraint::Free);
+        let fastest = turning.map(|grain| grain.angular_velocity.length()).fold(0.0, f64::max);
+        let turns = (fastest * dt / LARGEST_TURN).min(MAX_TURNS);
+        let substeps = turns.max(self.contact_substeps(dt)).ceil();
+        if substeps.is_nan() { 1 } else { substeps.clamp(1.0, MAX_SUBSTEPS) as usize }
+    }
+
+    /// Number of sub-steps for `dt` [s] that the shortest contact time asks for.
+    fn contact_substeps(&self, dt: f64) -> f64 {
         let (mut shortest, mut fastest, mut any_movable) = (f64::INFINITY, 0.0_f64, false);
         for record in &self.records {
             let (body, partner) = self.bodies_of(&record.key);
@@ -128,7 +143,7 @@ impl ContactDynamics {
             }
         }
         if !any_movable {
-            return 1;
+            return 1.0;
         }
         let ContactParams { substeps_per_contact, roughness, .. } = self.model.params;
         let mut longest_step = shortest / substeps_per_contact;
@@ -136,8 +151,7 @@ impl ContactDynamics {
             // No pair closes its lubrication film by more than half the height of the asperities.
             longest_step = longest_step.min(0.5 * roughness / fastest);
         }
-        let count = (dt / longest_step).ceil();
-        if count.is_nan() { 1 } else { count.clamp(1.0, MAX_SUBSTEPS) as usize }
+        dt / longest_step
     }
 
     /// First body of a pair, and its partner if that is a grain.

@@ -30,7 +30,7 @@ impl Reference {
         (0..3).map(along).sum()
     }
 
-    /// Weight 1 / A - 1 of the link along `axis` from the face `lower` to the next; 0 for open
+    /// Weight 1 / A' - 1 of the link along `axis` from the face `lower` to the next; 0 for open
     /// links, `None` for links without correction.
     pub fn link_weight(
         &self,

@@ -13,9 +13,9 @@ impl Reference {
     /// Residual of the momentum [N s] and angular momentum [N m s] of grain `index` in a step from
     /// the previous velocities to `new`, under the `load` of weight, buoyancy and contact:
     ///
-    /// (m - m_f)(V - V_old) + m_v (V - V_old - previous change) + J - dt F = 0, and the same with
-    /// I, Omega, the previous acceleration times dt, and the gyroscopic torque
-    /// Omega_old x (I - I_f) Omega_old.
+    /// (m - m_f)(V - V_old) - m dV + m_v (V - V_old - previous change) + J - dt F = 0 with the
+    /// change dV that was set between the steps, and the same with I, Omega, the previous
+    /// acceleration times dt, and the gyroscopic torque Omega_start x (I - I_f) Omega_start.
     pub fn momentum_residual(
         &self,
         index: usize,
@@ -31,12 +31,13 @@ impl Reference {
         let virtual_part = ((1.0 - ratio) / 0.2).clamp(0.0, 1.0) / ratio;
         let own_part = 1.0 - 1.0 / ratio;
         let (change, rate) = (new - previous.velocity, previous.acceleration);
-        let omega = previous.velocity.angular;
+        let (set, omega) = (previous.set_change, previous.start_velocity().angular);
         let inertia = grain.inertia();
         let gyroscopic = omega.cross(own_part * (inertia * omega));
-        let linear = own_part * change.linear + virtual_part * (change.linear - previous.change);
-        let angular =
-            own_part * change.angular + virtual_part * (change.angular - dt * rate.angular);
+        let linear = own_part * change.linear - set.linear
+            + virtual_part * (change.linear - previous.change);
+        let angular = own_part * change.angular - set.angular
+            + virtual_part * (change.angular - dt * rate.angular);
         [
             grain.mass() * linear + linear_impulse - dt * load.force,
             inertia * angular + angular_impulse - dt * (load.torque - gyroscopic),
@@ -52,8 +53,9 @@ impl Reference {
         new: RigidVelocity,
         load: Load,
     ) -> Load {
-        let (grain, rate) = (&self.grains[index], (new - previous.velocity) / self.dt);
-        let (inertia, omega) = (grain.inertia(), previous.velocity.angular);
+        let start = previous.start_velocity();
+        let (grain, rate) = (&self.grains[index], (new - start) / self.dt);
+        let (inertia, omega) = (grain.inertia(), start.angular);
         Load {
             force: grain.mass() * rate.linear - load.force,
             torque: inertia * rate.angular + omega.cross(inertia * omega) - load.torque,

@@ -151,6 +151,20 @@ impl Case {
         let rows = self.located[index].0.rows[component].iter();
         self.by_position(rows.map(|r| (r.at, r.first, r.count)), values, elsewhere)
     }
+
+    /// Faces all of whose links are open and within reach; walls and other grains are far.
+    fn faces_with_open_links(&self, index: usize, component: usize) -> Vec<IVec3> {
+        let mut faces = self.reference.faces(component);
+        let eps = self.locator.eps;
+        faces.retain(|face| {
+            let inner = face.x > 3 && face.x < 29 && face.z > 3 && face.z < 27;
+            let d = |at: IVec3| self.reference.distance(index, component, *face + at);
+            let around = [IVec3::X, IVec3::Y, IVec3::Z].map(|e| d(e).and(d(-e)));
+            let own = around.iter().all(Option::is_some);
+            inner && own && d(IVec3::ZERO).is_some_and(|d| d > 1.45 * eps && d < 1.55 * eps)
+        });
+        faces
+    }
 }
 
 fn assert_close(found: f64, expected: f64, tolerance: f64, quantity: &str) {
@@ -320,15 +334,7 @@ fn the_flux_next_to_a_grain_is_that_of_averaged_products() {
         let body = &case.located[index].0;
         find_correction(eps, nu, &known, &kinematics, body, &mut scratch, &mut correction);
         let found = case.by_row(index, 0, &correction[0], 0.0);
-        let mut faces = case.reference.faces(0);
-        faces.retain(|face| {
-            // All links of these faces are open and within reach; walls and other grains are far.
-            let inner = face.x > 3 && face.x < 29 && face.z > 3 && face.z < 27;
-            let d = |at: IVec3| case.reference.distance(index, 0, *face + at);
-            let around = [IVec3::X, IVec3::Y, IVec3::Z].map(|e| d(e).and(d(-e)));
-            let own = around.iter().all(Option::is_some);
-            inner && own && d(IVec3::ZERO).is_some_and(|d| d > 1.45 * eps && d < 1.55 * eps)
-        });
+        let faces = case.faces_with_open_links(index, 0);
         assert!(faces.len() > 40, "{}", faces.len());
         for face in faces {
             let x = case.reference.position(0, face);
@@ -339,6 +345,38 @@ fn the_flux_next_to_a_grain_is_that_of_averaged_products() {
             let expected = -added * 2.0 * a * a * x.x / (1.0 + k * s).powi(2);
             let tolerance = if nu > 1.0 { 1e-12 } else { 0.02 * expected.abs() };
             assert_close(found[case.reference.at(face)], expected, tolerance, "correction");
+        }
+    }
+}
+
+/// Products of two components, u = a x z and w = b x z, count relative to the velocity of a grain
+/// that turns about y at the rate s.
+#[test]
+fn the_flux_of_averaged_products_is_relative_to_the_turning_grain() {
+    let mut case = Case::new(Scheme::Aperture);
+    let (eps, index, [a, b, s]) = (case.locator.eps, 1, [0.7, -0.4, 0.9]);
+    let mesh = case.reference.mesh;
+    case.flow.velocity.fill_with(&mesh, |axis, x| [a, 0.0, b][axis] * x.x * x.z);
+    let grain = case.reference.grains[index].clone();
+    let turning = grain.with_velocity(DVec3::ZERO).with_angular_velocity(s * DVec3::Y);
+    let (known, _) = case.flow.prediction();
+    let (mut scratch, mut correction) = Default::default();
+    let (body, kinematics) = (&case.located[index].0, RigidState::of(&turning));
+    find_correction(eps, 1e6, &known, &kinematics, body, &mut scratch, &mut correction);
+    let added = 0.75 * (1.0 / 3.0 - 2.0 / std::f64::consts::PI.powi(2)) * eps * eps;
+    for component in [0, 2] {
+        let found = case.by_row(index, component, &correction[component], 0.0);
+        let faces = case.faces_with_open_links(index, component);
+        assert!(faces.len() > 40, "{}", faces.len());
+        for face in faces {
+            // Gradients of u - U and w - U: (a z, 0, a x - s) and (b z + s, 0, b x).
+            let x = case.reference.position(component, face);
+            let divergence = match component {
+                0 => 2.0 * a * (a * x.x - s) + 2.0 * a * b * x.z + a * s,
+                _ => 2.0 * a * b * x.x - b * s + 2.0 * b * (b * x.z + s),
+            };
+            let found = found[case.reference.at(face)];
+            assert_close(found, -added * divergence, 1e-12, "correction");
         }
     }
 }

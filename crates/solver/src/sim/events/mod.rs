@@ -71,7 +71,8 @@ pub struct EventParams {
     pub separation_gap: f64,
     /// Time without contact after which a pair counts as separated [s].
     pub separation_hold: f64,
-    /// Angle between line of centres and vertical at which tumbling begins [rad].
+    /// Angle between line of centres and vertical at which tumbling begins [rad]; infinite without
+    /// gravity, where there is no vertical.
     pub tumble_angle: f64,
     /// Difference in height that confirms a role change [m].
     pub role_margin: f64,
@@ -105,7 +106,7 @@ impl EventParams {
             enclosure,
             separation_gap: 0.05 * d,
             separation_hold: if g > 0.0 { (d / g).sqrt() } else { 0.0 },
-            tumble_angle: std::f64::consts::FRAC_PI_4,
+            tumble_angle: if g > 0.0 { std::f64::consts::FRAC_PI_4 } else { f64::INFINITY },
             role_margin: 0.02 * d,
             rest_speed: 1e-3 * (g * d).sqrt(),
         }
