@@ -71,17 +71,18 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
     let vertical = pair.map(|grain| scene.curve(grain, |h, row| h.velocity[row].dot(up) / unit));
     let speed = |h: &History, row: usize| h.velocity[row].reject_from_normalized(up).length();
     let horizontal = pair.map(|grain| scene.curve(grain, |h, row| speed(h, row) / unit));
-    let fastest = vertical.each_ref().map(|curve| curve.values().fold(0.0, f64::min));
+    let [trailing, leading] =
+        vertical.each_ref().map(|curve| short(curve.peak().map_or(0.0, |peak| peak.1)));
     let sideways = horizontal.iter().flat_map(Series::values).fold(0.0, f64::max);
     let (v, h, unit) = match scene.features.scales {
         Some(_) => ("*v*_{z} / √(*d* *g*)  [–]", "|*v*_{h}| / √(*d* *g*)  [–]", " √(d g)"),
         None => ("*v*_{z}  [m/s]", "|*v*_{h}|  [m/s]", " m/s"),
     };
     let caption = format!(
-        "(a) Vertical velocity of both grains (down is negative): the grain that trails at the \
-         start reaches {}{unit}, the other {}{unit}. (b) Horizontal speed, up to {}{unit}.",
-        short(fastest[0]),
-        short(fastest[1]),
+        "(a) {} of both grains: the grain that trails at the start reaches {trailing}{unit}, the \
+         other {leading}{unit}. (b) {}, up to {}{unit}.",
+        scene.features.vertical_velocity(),
+        scene.features.horizontal_speed(),
         short(sideways)
     );
     let panels = [
@@ -104,17 +105,14 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         |value: &dyn Fn(&History, usize) -> f64| Series { name: None, ..scene.curve(grain, value) };
     let vertical = curve(&|h, row| h.velocity[row].dot(up));
     let horizontal = curve(&|h, row| h.velocity[row].reject_from_normalized(up).length());
-    let largest = |curve: &Series| {
-        let points = curve.points.iter().copied();
-        points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-    };
-    let (peak, sideways) = (largest(&vertical)?, largest(&horizontal)?);
+    let (peak, sideways) = (vertical.peak()?, horizontal.peak()?);
     let fastest = peak.1.abs().max(sideways.1);
     let mut panels = Vec::new();
     let mut sentences = Vec::new();
     if peak.1.abs() >= ROUND_OFF * fastest {
         sentences.push(format!(
-            "Vertical velocity (down is negative); the largest is {} m/s at *t* = {} s.",
+            "{}; the largest is {} m/s at *t* = {} s.",
+            scene.features.vertical_velocity(),
             short(peak.1),
             short(peak.0)
         ));
@@ -127,7 +125,8 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         }
     }
     if sideways.1 > SIDEWAYS * fastest {
-        sentences.push(format!("Horizontal speed, up to {} m/s.", short(sideways.1)));
+        let name = scene.features.horizontal_speed();
+        sentences.push(format!("{name}, up to {} m/s.", short(sideways.1)));
         panels.push(Panel::linear("|*v*_{h}|  [m/s]", vec![horizontal], &[0.0], 65.0));
     }
     if let (Some(diameter), Some(viscosity)) = (facts.diameter(), facts.viscosity) {

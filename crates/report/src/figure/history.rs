@@ -66,22 +66,21 @@ pub fn each(scene: &Scene) -> Option<Figure> {
         };
         moving.iter().enumerate().map(one).collect()
     };
-    let fastest = |grain: &usize| {
-        let speeds = scene.run.grains[*grain].velocity.iter().map(|v| -v.dot(up));
-        let speed = speeds.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        Some(format!("{} of grain {grain}", short(speed)))
-    };
-    let fastest: Vec<String> = moving.iter().filter_map(fastest).collect();
     let height = curves(&|h, row| 1e3 * h.position[row].dot(up));
     let velocity = curves(&|h, row| h.velocity[row].dot(up));
+    let peak = |(grain, curve): (&usize, &Series)| {
+        Some(format!("{} of grain {grain}", short(curve.peak()?.1)))
+    };
+    let peaks: Vec<String> = moving.iter().zip(&velocity).filter_map(peak).collect();
     let panels = [
         Panel::linear("height  [mm]", height, &[], 110.0),
         Panel::linear("*v*_{z}  [m/s]", velocity, &[0.0], 110.0),
     ];
     let caption = format!(
-        "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the \
-         largest settling speeds [m/s] are {}.",
-        fastest.join(", ")
+        "(a) Height of the centre of each grain. (b) {}; the values of largest magnitude [m/s] \
+         are {}.",
+        scene.features.vertical_velocity(),
+        peaks.join(", ")
     );
     let title = "Height and velocity of each grain";
     Some(scene.with_events("grains", title, caption, &panels))

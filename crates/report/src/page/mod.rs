@@ -14,6 +14,8 @@ use crate::run_folder::RunFolder;
 
 /// Saved 3-D page in a run folder, to which the report links.
 const VIEW: &str = "view.html";
+/// Part of the diameter below which a distance is round-off.
+const ROUND_OFF: f64 = 1e-6;
 
 /// Returns the page.
 pub fn page(
@@ -44,7 +46,7 @@ fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
     let general = match features.kind {
         RunKind::Flow => "Flow without grains",
         RunKind::Single => "One grain",
-        RunKind::Pair => "Settling pair",
+        RunKind::Pair => "Two grains",
         RunKind::Many => "Many grains",
     };
     run.facts.title.as_deref().unwrap_or(general)
@@ -91,11 +93,15 @@ fn pair_sentence(features: &RunFeatures) -> String {
 }
 
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
-    let velocities = run.grains.iter().flat_map(|h| &h.velocity);
-    let peak = velocities.map(|v| -v.dot(features.up)).fold(0.0, f64::max);
-    match peak > 0.0 {
-        true => format!("The grain reached {} m/s downwards. ", short(peak)),
-        false => String::new(),
+    let velocities = run.grains.iter().flat_map(|h| &h.velocity).filter(|v| v.is_finite());
+    let fastest = velocities.max_by(|a, b| a.length().total_cmp(&b.length()));
+    let least = ROUND_OFF * run.facts.diameter().unwrap_or(0.0);
+    match fastest.filter(|v| v.length() * features.end > least) {
+        Some(v) => {
+            let direction = features.direction_text(*v);
+            format!("The grain reached {} m/s {direction}. ", short(v.length()))
+        }
+        None => String::new(),
     }
 }
 

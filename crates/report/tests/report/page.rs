@@ -40,6 +40,27 @@ fn picture(file: &Path) -> (u32, f64) {
     (info.width, inked as f64 / (info.width * info.height) as f64)
 }
 
+/// Changes the cells of each row of `grains.csv`.
+fn edit_rows(folder: &Path, edit: impl Fn(&mut [String])) {
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let edited = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if cells[0] != "time" {
+            edit(&mut cells);
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(edited).collect::<String>()).unwrap();
+}
+
+/// Replaces a part of a file of a run, which it must hold.
+fn replace(folder: &Path, name: &str, from: &str, to: &str) {
+    let text = std::fs::read_to_string(folder.join(name)).unwrap();
+    assert!(text.contains(from), "{name} lacks {from}: {text}");
+    std::fs::write(folder.join(name), text.replace(from, to)).unwrap();
+}
+
 fn small_pair(swing: f64) -> std::path::PathBuf {
     let folder = fresh::folder("pair");
     pair::pair(&folder, swing, 0.5e-3);
@@ -396,16 +417,11 @@ fn few_grains_are_shown_one_by_one() {
     }
     assert!(page(&rendered).contains("Events are named with the indices of their grains"));
     // A grain that falls out of the box is not claimed to be drawn.
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let out = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" && cells[1] == "7" && cells[0].parse::<f64>().unwrap() > 0.3 {
-            cells[4] = "-0.05";
+    edit_rows(&folder, |cells| {
+        if cells[1] == "7" && cells[0].parse::<f64>().unwrap() > 0.3 {
+            cells[4] = "-0.05".into();
         }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(out).collect::<String>()).unwrap();
+    });
     assert!(page(&render(&folder).unwrap()).contains("Grain 7 has left the box"));
     remove(&folder);
 }
@@ -413,16 +429,7 @@ fn few_grains_are_shown_one_by_one() {
 #[test]
 fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
     let folder = small_pair(0.9);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let still = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" {
-            cells[12..15].fill("3e-18");
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[12..15].fill("3e-18".into()));
     let summary = folder.join("summary.json");
     let mut value: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&summary).unwrap()).unwrap();
@@ -527,16 +534,7 @@ fn grains_are_named_by_number_and_fields_by_precision() {
 #[test]
 fn grains_that_do_not_turn_have_no_angular_speed() {
     let folder = small_pair(0.9);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let still = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" {
-            cells[12..15].fill("0");
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[12..15].fill("0".into()));
     let seen = text_of(&svg(&render(&folder).unwrap(), "orientation"));
     assert!(seen.contains("long axis  [°]") && !seen.contains("ω"), "{seen}");
     remove(&folder);
@@ -546,18 +544,50 @@ fn grains_that_do_not_turn_have_no_angular_speed() {
 fn a_grain_that_moves_sideways_shows_its_horizontal_speed() {
     let folder = fresh::folder("single");
     flows::single(&folder);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
     // The velocity is turned to x, with round-off along z.
-    let turned = |line: &str| {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        if cells[0] != "time" {
-            cells[5] = std::mem::replace(&mut cells[7], "1e-12".into());
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(turned).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[5] = std::mem::replace(&mut cells[7], "1e-12".into()));
     let seen = text_of(&svg(&render(&folder).unwrap(), "velocity"));
     assert!(seen.contains("|vh|  [m/s]") && !seen.contains("vz"), "{seen}");
+    remove(&folder);
+}
+
+/// Reverses the vertical velocity before `end` [s]; the rows after it are those of a rebound.
+fn rise(folder: &Path, end: f64) {
+    edit_rows(folder, |cells| {
+        let factor = if cells[0].parse::<f64>().unwrap() < end { -1.0 } else { 0.3 };
+        cells[7] = (factor * cells[7].parse::<f64>().unwrap()).to_string();
+    });
+}
+
+#[test]
+fn the_largest_speed_has_its_direction() {
+    let folder = fresh::folder("single");
+    flows::single(&folder);
+    rise(&folder, 1.29);
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("The grain reached 0.0998 m/s upwards. "), "{said}");
+    replace(&folder, "case.resolved.toml", "gravity = [0, 0, -9.81]\n", "gravity = [0, 0, 0]\n");
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("0.0998 m/s in the direction (0.00, 0.00, 1.00). "), "{said}");
+    assert!(said.contains("Velocity along z; the largest is 0.0998 m/s") && !said.contains("down"));
+    // A speed that is round-off is not reported.
+    edit_rows(&folder, |cells| cells[5..8].fill("3e-11".into()));
+    assert!(!page(&render(&folder).unwrap()).contains("The grain reached"));
+    remove(&folder);
+}
+
+#[test]
+fn the_velocities_of_a_pair_that_rises_are_positive() {
+    let folder = small_pair(0.0);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    let peaks = || {
+        let said = text_of(&svg(&render(&folder).unwrap(), "velocity"));
+        let texts = said.split("at the start reaches ").nth(1).unwrap();
+        texts.split(". (b)").next().unwrap().to_owned()
+    };
+    let settling = peaks();
+    assert_eq!(settling.matches('−').count(), 2, "{settling}");
+    rise(&folder, f64::INFINITY);
+    assert_eq!(peaks(), settling.replace('−', ""));
     remove(&folder);
 }
