@@ -129,16 +129,20 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         sentences.push(format!("{name}, up to {} m/s.", short(sideways.1)));
         panels.push(Panel::linear("|*v*_{h}|  [m/s]", vec![horizontal], &[0.0], 65.0));
     }
-    if let (Some(diameter), Some(viscosity)) = (facts.diameter(), facts.viscosity) {
-        let reynolds = curve(&|h, row| h.velocity[row].length() * diameter / viscosity);
+    let fluid = facts.viscosity.filter(|_| facts.inflow.is_some());
+    if let (Some(diameter), Some(viscosity)) = (facts.diameter(), fluid) {
+        let speed = |h: &History, row: usize| facts.relative_speed(h.velocity[row]);
+        let number = |speed: f64| speed * diameter / viscosity;
+        let reynolds = curve(&|h, row| speed(h, row).map_or(f64::NAN, number));
         let highest = short(reynolds.values().fold(0.0, f64::max));
-        let label = "Re = |*v*| *d*/*ν*  [–]";
-        panels.push(Panel::linear(label, vec![reynolds], &[0.0], 65.0));
+        let label = format!("Re = {} *d*/*ν*  [–]", facts.relative_speed_symbol());
+        panels.push(Panel::linear(&label, vec![reynolds], &[0.0], 65.0));
         let number = scene.features.scales.zip(facts.density_ratio());
         let galileo = number.map_or(String::new(), |(scales, ratio)| {
             format!(" (Galileo number {})", short(galileo(scales, ratio, viscosity)))
         });
-        sentences.push(format!("Reynolds number, up to {highest}{galileo}."));
+        let relative = if facts.has_inflow() { " of the speed relative to the inflow" } else { "" };
+        sentences.push(format!("Reynolds number{relative}, up to {highest}{galileo}."));
     }
     let caption = lettered(&sentences);
     Some(scene.with_events("velocity", "Velocity of the grain", caption, &panels))

@@ -591,3 +591,35 @@ fn the_velocities_of_a_pair_that_rises_are_positive() {
     assert_eq!(peaks(), settling.replace('−', ""));
     remove(&folder);
 }
+
+#[test]
+fn a_dry_run_has_no_rows_about_the_grid() {
+    let folder = fresh::folder("dry");
+    heap::heap(&folder, 3, false);
+    let rendered = render(&folder).unwrap();
+    let said = page(&rendered);
+    for name in ["cells", "cell edge", "cells per diameter", "coupling", "divergence"] {
+        assert!(!said.contains(&format!("row\">{name}")), "{name}: {said}");
+    }
+    assert!(!said.contains("largest divergence"), "{said}");
+    let seen = text_of(&svg(&rendered, "diagnostics"));
+    assert!(seen.contains("Kinetic energy of the grains.") && !seen.contains("(a)"), "{seen}");
+    remove(&folder);
+}
+
+#[test]
+fn the_reynolds_number_is_relative_to_the_inflow() {
+    let folder = fresh::folder("stream");
+    flows::single(&folder);
+    edit_rows(&folder, |cells| cells[5..8].fill("0".into()));
+    assert!(!page(&render(&folder).unwrap()).contains("Reynolds number at"), "nothing moves");
+    let inflow = "z = [{ kind = \"inflow\", velocity = [0.0, 0.0, 0.02] }, \"outflow\"]";
+    replace(&folder, "case.resolved.toml", "z = [\"wall\", \"free-surface\"]", inflow);
+    let said = page(&render(&folder).unwrap());
+    let name = "Reynolds number at the largest speed relative to the inflow, \
+                |<i>v</i> − <i>U</i>| <i>d</i> / <i>ν</i>";
+    // 0.02 m/s * 0.015 m / (0.058 / 960 m2/s)
+    assert!(said.contains(&format!("{name}</th><td>4.97</td>")), "{said}");
+    assert!(said.contains("inflow below, outflow above"));
+    remove(&folder);
+}
