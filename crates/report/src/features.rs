@@ -1,7 +1,7 @@
 //! Features of a run derived from its tables: kind, scales, pair, phases and key instants.
 
 use glam::DVec3;
-use grainwake_formats::events::Event;
+use grainwake_formats::events::{Event, EventKind};
 use grainwake_plot::minus;
 
 use crate::phases::{self, Instant, PairEvent, Phase};
@@ -95,8 +95,10 @@ impl RunFeatures {
             [a, b] => Some([b, a]),
             _ => None,
         };
+        // A pair is observed until a grain leaves the box.
+        let together = phases::first(&run.events, EventKind::Left).map_or(end, |t| t.min(end));
         let phases = pair.map_or(Vec::new(), |_| {
-            phases::phases(&run.events, run.summary_number("tumble_time_s"), end)
+            phases::phases(&run.events, run.summary_number("tumble_time_s"), together)
         });
         let of_pair =
             |moment: fn(&[Event]) -> Option<PairEvent>| pair.and_then(|_| moment(&run.events));
@@ -110,8 +112,10 @@ impl RunFeatures {
         let instants = match kind {
             RunKind::Flow => last(),
             RunKind::Single if !travels => last(),
-            RunKind::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
-            _ => phases::even_instants(end),
+            RunKind::Pair => {
+                phases::pair_instants(&phases, &run.events, closest(run, pair), together)
+            }
+            _ => phases::even_instants(run.last_row()),
         };
         RunFeatures {
             kind,

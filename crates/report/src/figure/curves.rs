@@ -26,6 +26,9 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
         let curve = Series::new(points, style::BLUE).named("surfaces");
         curves.push(curve.dashed("4 1.5"));
     }
+    let left = scene.run.events.iter().find(|event| event.kind == EventKind::Left);
+    let end = left.and_then(|event| event.grains.first());
+    let end = end.map_or("at the end".to_owned(), |n| format!("when grain {n} leaves the box"));
     let (label, unit) = match scaled {
         true => ("distance / *d*  [–]", "diameters"),
         false => ("distance  [m]", "m"),
@@ -39,10 +42,10 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let mut angle = Panel::with_axis(axis, vec![Series::new(tilt, style::GREEN)], 70.0);
     angle.levels.push((90.0, "side by side".to_owned()));
     let mut caption = format!(
-        "(a) Distance D_{{r}} of the two centres: {} {unit} at the start, at least {}, and {} at \
-         the end. (b) Angle between the vertical and the line from the grain that leads at the \
-         start to the one that trails: 0° one above the other, 90° side by side, larger after a \
-         role change.",
+        "(a) Distance D_{{r}} of the two centres: {} {unit} at the start, at least {}, and {} \
+         {end}. (b) Angle between the vertical and the line from the grain that leads at the start \
+         to the one that trails: 0° one above the other, 90° side by side, larger after a role \
+         change.",
         short(first),
         short(closest),
         short(last)

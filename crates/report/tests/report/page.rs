@@ -623,3 +623,83 @@ fn the_reynolds_number_is_relative_to_the_inflow() {
     assert!(said.contains("inflow below, outflow above"));
     remove(&folder);
 }
+
+/// Returns the heights of the letters (a), (b) ... in a drawing, and its last frame.
+fn letters_and_frame(svg: &str) -> (Vec<f64>, [f64; 2]) {
+    let document = roxmltree::Document::parse(svg).unwrap();
+    let number = |node: &roxmltree::Node, name: &str| -> f64 {
+        node.attribute(name).unwrap().parse().unwrap()
+    };
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    let letter =
+        |node: &roxmltree::Node| node.text().is_some_and(|t| t.len() == 3 && &t[..1] == "(");
+    let mut letters: Vec<(String, f64)> = texts
+        .filter(letter)
+        .map(|node| (node.text().unwrap().to_owned(), number(&node, "y")))
+        .collect();
+    letters.sort_by(|a, b| a.0.cmp(&b.0));
+    let rects = document.descendants().filter(|node| node.has_tag_name("rect"));
+    let frame = rects.filter(|rect| rect.attribute("fill") == Some("none")).last().unwrap();
+    let top = number(&frame, "y");
+    let letters = letters.into_iter().map(|(_, y)| y).collect();
+    (letters, [top, top + number(&frame, "height")])
+}
+
+#[test]
+fn a_pair_is_observed_until_a_grain_leaves_the_box() {
+    let folder = small_pair(0.0);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    // Grain 1 leaves through the floor at 0.2 s, grain 0 at 0.3 s.
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let inside = |line: &&str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let end = if cells[1] == "1" { 0.2 } else { 0.3 };
+        cells[0].parse::<f64>().map_or(true, |time| time <= end)
+    };
+    let kept: Vec<&str> = table.lines().filter(inside).collect();
+    std::fs::write(&file, kept.join("\n") + "\n").unwrap();
+    edit_rows(&folder, |cells| {
+        let time: f64 = cells[0].parse().unwrap();
+        cells[4] = (0.05 - 0.3 * time).to_string();
+    });
+    let left = |grain: usize, time: f64| {
+        format!(
+            "{{\"time\":{time},\"event\":\"left\",\"grains\":[{grain}],\"confirmed\":{time}}}\n"
+        )
+    };
+    std::fs::write(folder.join("events.jsonl"), left(1, 0.2) + &left(0, 0.3)).unwrap();
+    let summary = folder.join("summary.json");
+    let text = std::fs::read_to_string(&summary).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    value.as_object_mut().unwrap().remove("tumble_time_s");
+    std::fs::write(&summary, value.to_string()).unwrap();
+    let rendered = render(&folder).unwrap();
+    let said = page(&rendered);
+    assert!(said.contains("aria-label=\"Phases: drafting from 0 s to 0.200 s\""), "{said}");
+    assert!(said.contains("when grain 1 leaves the box. (b)"), "{said}");
+    assert!(said.contains("The letters are at the height of grain 0."), "{said}");
+    let (letters, [top, bottom]) = letters_and_frame(&svg(&rendered, "trajectories"));
+    assert!(letters.len() >= 2 && letters.is_sorted(), "{letters:?}");
+    // The middle of a letter is 2.4 pt above its baseline.
+    let inside = |y: &f64| (top..=bottom).contains(&(y - 2.4));
+    assert!(letters.iter().all(inside), "{letters:?} {top} {bottom}");
+    remove(&folder);
+}
+
+#[test]
+fn letters_follow_a_grain_through_a_periodic_box() {
+    let folder = fresh::folder("periodic");
+    heap::heap(&folder, 3, false);
+    let faces = "cells = [20, 20, 50]\n[domain.boundaries]\nx = \"wall\"\ny = \"wall\"\n\
+                 z = \"periodic\"\n";
+    replace(&folder, "case.resolved.toml", "cells = [20, 20, 50]\n", faces);
+    // All grains fall by 60 mm in a box of 100 mm: only grain 0 stays clear of the periodic side.
+    edit_rows(&folder, |cells| {
+        let (time, grain): (f64, f64) = (cells[0].parse().unwrap(), cells[1].parse().unwrap());
+        cells[4] = (0.09 - 0.1 * time - 0.03 * grain).to_string();
+    });
+    let (letters, _) = letters_and_frame(&svg(&render(&folder).unwrap(), "trajectories"));
+    assert!(letters.len() == 4 && letters.is_sorted(), "{letters:?}");
+    remove(&folder);
+}
