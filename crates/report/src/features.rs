@@ -7,6 +7,9 @@ use grainwake_plot::minus;
 use crate::phases::{self, Instant, PairEvent, Phase};
 use crate::run_folder::{History, RunFolder};
 
+/// Part of the diameter below which a distance is round-off.
+const ROUND_OFF: f64 = 1e-6;
+
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunKind {
@@ -140,6 +143,11 @@ impl RunFeatures {
     /// Returns the name of the speed normal to `up` in captions.
     pub fn horizontal_speed(&self) -> &'static str {
         if self.has_gravity { "Horizontal speed" } else { "Speed normal to z" }
+    }
+
+    /// Returns whether a speed [m/s] moves a grain by more than round-off during the run.
+    pub fn is_motion(&self, run: &RunFolder, speed: f64) -> bool {
+        speed * self.end > ROUND_OFF * run.facts.diameter().unwrap_or(0.0)
     }
 
     /// Returns the direction of a velocity in words or, without gravity, as a unit vector.

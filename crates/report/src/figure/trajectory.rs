@@ -175,7 +175,8 @@ fn label_instants(
     let ((left, top), bottom) = (frame.corner, frame.corner.1 + frame.height());
     let place = |(i, instant): (usize, &Instant)| {
         let position = scene.run.wrapped(history.position[history.nearest(instant.time)?]);
-        let y = frame.at((0.0, position[up])).1;
+        // Equal heights but for round-off keep the order of the instants.
+        let y = (2.0 * frame.at((0.0, position[up])).1).round() / 2.0;
         Some((y.clamp(top, bottom), letter(i)))
     };
     let mut places: Vec<(f64, String)> =

@@ -14,8 +14,6 @@ use crate::run_folder::RunFolder;
 
 /// Saved 3-D page in a run folder, to which the report links.
 const VIEW: &str = "view.html";
-/// Part of the diameter below which a distance is round-off.
-const ROUND_OFF: f64 = 1e-6;
 
 /// Returns the page.
 pub fn page(
@@ -95,8 +93,7 @@ fn pair_sentence(features: &RunFeatures) -> String {
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
     let velocities = run.grains.iter().flat_map(|h| &h.velocity).filter(|v| v.is_finite());
     let fastest = velocities.max_by(|a, b| a.length().total_cmp(&b.length()));
-    let least = ROUND_OFF * run.facts.diameter().unwrap_or(0.0);
-    match fastest.filter(|v| v.length() * features.end > least) {
+    match fastest.filter(|v| features.is_motion(run, v.length())) {
         Some(v) => {
             let direction = features.direction_text(*v);
             format!("The grain reached {} m/s {direction}. ", short(v.length()))

@@ -65,7 +65,8 @@ fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     rows.add(&name, known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))));
     let velocities = run.grains.iter().flat_map(|h| &h.velocity);
     let speeds = velocities.filter_map(|v| facts.relative_speed(*v));
-    let fastest = speeds.filter(|v| v.is_finite() && *v > 0.0).reduce(f64::max);
+    let fastest = speeds.filter(|v| v.is_finite()).reduce(f64::max);
+    let fastest = fastest.filter(|speed| features.is_motion(run, *speed));
     let known = fastest.zip(diameter).zip(viscosity);
     let relative = if facts.has_inflow() { " relative to the inflow" } else { "" };
     let symbol = facts.relative_speed_symbol();
