@@ -640,8 +640,8 @@ fn letters_and_frame(svg: &str) -> (Vec<f64>, [f64; 2]) {
         .map(|node| (node.text().unwrap().to_owned(), number(&node, "y")))
         .collect();
     letters.sort_by(|a, b| a.0.cmp(&b.0));
-    let rects = document.descendants().filter(|node| node.has_tag_name("rect"));
-    let frame = rects.filter(|rect| rect.attribute("fill") == Some("none")).last().unwrap();
+    let mut rects = document.descendants().filter(|node| node.has_tag_name("rect"));
+    let frame = rects.rfind(|rect| rect.attribute("fill") == Some("none")).unwrap();
     let top = number(&frame, "y");
     let letters = letters.into_iter().map(|(_, y)| y).collect();
     (letters, [top, top + number(&frame, "height")])
