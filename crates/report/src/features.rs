@@ -54,8 +54,10 @@ pub struct RunFeatures {
     pub has_gravity: bool,
     /// Unit vector against gravity; +z if gravity is unknown or zero.
     pub up: DVec3,
-    /// Trailing and leading grain of a pair at the start. Of grains that rise the upper one leads;
-    /// without gravity the one ahead in their mean displacement.
+    /// Unit vector from the leading to the trailing grain of a pair that moves in line: up or, if
+    /// the grains rise, down. Without gravity against their mean displacement.
+    pub back: DVec3,
+    /// Trailing and leading grain of a pair at the start, by their positions along `back`.
     pub pair: Option<[usize; 2]>,
     /// Phases of a pair.
     pub phases: Vec<Phase>,
@@ -125,6 +127,7 @@ impl RunFeatures {
             scales,
             has_gravity,
             up,
+            back,
             pair,
             phases,
             kiss: of_pair(phases::kiss),

@@ -16,7 +16,7 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let scaled = features.scales.is_some();
     let unit = features.scales.map_or(1.0, |s| s.diameter);
     let centres = scene.pair_curve(|r| r.length() / unit)?;
-    let tilt = scene.pair_curve(|r| r.angle_between(features.up).to_degrees())?;
+    let tilt = scene.pair_curve(|r| r.angle_between(features.back).to_degrees())?;
     let closest = centres.iter().map(|p| p.1).min_by(f64::total_cmp)?;
     let (first, last) = (centres.first()?.1, centres.last()?.1);
     let mut curves = vec![Series::new(centres, style::INK).named("centres, *D*_{r}")];
@@ -43,12 +43,12 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     angle.levels.push((90.0, "side by side".to_owned()));
     let mut caption = format!(
         "(a) Distance D_{{r}} of the two centres: {} {unit} at the start, at least {}, and {} \
-         {end}. (b) Angle between the vertical and the line from the grain that leads at the start \
-         to the one that trails: 0° one above the other, 90° side by side, larger after a role \
-         change.",
+         {end}. (b) Angle between {} and the line from the grain that leads at the start to the \
+         one that trails: 0° one behind the other, 90° side by side, larger after a role change.",
         short(first),
         short(closest),
-        short(last)
+        short(last),
+        if features.has_gravity { "the vertical" } else { "the mean direction of motion" }
     );
     let role_change = scene.run.events.iter().find(|event| event.kind == EventKind::RoleChange);
     for (text, time) in [

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use grainwake_formats::FormatError;
+use grainwake_plot::style;
 use grainwake_report::features::RunFeatures;
 use grainwake_report::run_folder::RunFolder;
 use grainwake_report::{ReportError, ReportFiles, render};
@@ -139,12 +140,24 @@ fn the_upper_grain_leads_a_pair_that_rises() {
     pair::pair(&folder, 0.0, 1e-3);
     let pair = || RunFeatures::of(&RunFolder::open(&folder).unwrap()).pair.unwrap();
     let sinking = pair();
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    // Height on paper of the tilt at the start; y points down.
+    let tilt_at_start = || {
+        let gap = svg(&render(&folder).unwrap(), "gap");
+        let document = roxmltree::Document::parse(&gap).unwrap();
+        let mut nodes = document.descendants();
+        let curve = nodes.find(|node| node.attribute("stroke") == Some(style::GREEN)).unwrap();
+        let start = curve.attribute("d").unwrap().trim_start_matches('M').split('L').next();
+        start.unwrap().split(' ').nth(1).unwrap().parse::<f64>().unwrap()
+    };
+    let in_line = tilt_at_start();
     for name in ["case.resolved.toml", "summary.json"] {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
         std::fs::write(folder.join(name), text.replace("1500.0", "500.0")).unwrap();
     }
     let [trailing, leading] = pair();
     assert_eq!([leading, trailing], sinking);
+    assert_eq!(tilt_at_start(), in_line, "one behind the other is 0° for both");
     remove(&folder);
 }
 
