@@ -1,7 +1,7 @@
 //! `grainwake report`.
 
 use grainwake_report::{ReportError, render, write_film};
-use grainwake_run::number_format::size;
+use grainwake_run::number_format::{number, quantity, size};
 use grainwake_study::{Analysis, Plan};
 
 use crate::args::ReportArgs;
@@ -50,17 +50,23 @@ pub fn report(args: &ReportArgs) -> Result<(), Exit> {
     print(&format!("{} ({})", done.page.display(), count(done.png.len(), "figure")))
 }
 
+/// Rounds a value to three significant digits.
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
 /// Writes the film of a run folder.
 fn film(args: &ReportArgs) -> Result<(), Exit> {
     let film = write_film(&args.run)?;
     film.notes.iter().for_each(|note| tell!("note: {note}"));
     let [width, height] = film.size;
-    let slower = film.delay / film.interval;
+    let interval = three_digits(film.interval);
     tell!(
-        "{} pictures, {} s each, {:.3} s of the run apart ({slower:.3} times slower than the run)",
+        "{} pictures, {} s each, {} of the run apart ({} times slower than the run)",
         film.frames,
         film.delay,
-        film.interval
+        quantity(interval, "s"),
+        number(three_digits(film.delay / film.interval))
     );
     tell!(
         "video: ffmpeg -framerate {:.4} -i {} -pix_fmt yuv420p film.mp4",

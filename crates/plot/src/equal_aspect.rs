@@ -107,14 +107,15 @@ impl EqualAspectFrame {
         let bottom = y + height;
         ticks::horizontal(drawing, &across, (x, bottom), width, labels.0.is_some());
         let up = axis(low.1, high.1, height, 22.0);
-        let widest = ticks::vertical(drawing, &up, (x, y), height, labels.1.is_some(), None);
+        ticks::vertical(drawing, &up, (x, y), height, labels.1.is_some(), None);
         drawing.outline(x, y, width, height);
         if let Some(label) = labels.0.filter(|label| !label.is_empty()) {
             let base = (x + 0.5 * width, bottom + TICK + SMALL + 10.5);
             drawing.text(base, Anchor::Middle, label);
         }
         if let Some(label) = labels.1.filter(|label| !label.is_empty()) {
-            drawing.upward_text((x - TICK - widest - 6.0, y + 0.5 * height), label);
+            let base = x - TICK - ticks::widest(&up) - 6.0;
+            drawing.upward_text((base, y + 0.5 * height), label);
         }
     }
 }

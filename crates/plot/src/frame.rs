@@ -55,13 +55,13 @@ impl Frame {
     pub fn outline(&self, drawing: &mut Drawing, labelled: Labelled) {
         let (x, y, width, height) = (self.x, self.y, self.width, self.height);
         ticks::horizontal(drawing, &self.across, (x, y + height), width, labelled.across);
-        let widest = ticks::vertical(drawing, &self.up, (x, y), height, labelled.up, None);
+        ticks::vertical(drawing, &self.up, (x, y), height, labelled.up, None);
         drawing.outline(x, y, width, height);
         if labelled.across {
             self.horizontal_label(drawing);
         }
         if labelled.up {
-            let middle = (x - TICK - widest - 7.0, y + 0.5 * height);
+            let middle = (x - TICK - ticks::widest(&self.up) - 7.0, y + 0.5 * height);
             drawing.upward_text(middle, &self.up.label);
         }
     }

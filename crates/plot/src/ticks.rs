@@ -25,6 +25,11 @@ fn upwards(axis: &Axis, width: f64) -> bool {
     axis.has_categories() && !(all_fit && end <= width + OVERHANG)
 }
 
+/// Returns the width of the widest tick label of a vertical axis [pt].
+pub fn widest(axis: &Axis) -> f64 {
+    axis.ticks.iter().map(|(_, name)| text::width(name, SMALL)).fold(0.0, f64::max)
+}
+
 /// Returns the height of the tick labels of a horizontal axis of length `width` [pt].
 pub fn height(axis: &Axis, width: f64) -> f64 {
     let widths = axis.ticks.iter().map(|(_, name)| text::width(name, SMALL));
@@ -67,8 +72,6 @@ pub fn horizontal(
 
 /// Draws the ticks of a vertical axis of length `height` [pt] to the left of `(left, top)`, with
 /// grid lines of the given length at the inner labelled ticks.
-///
-/// Returns the width of the widest tick label [pt].
 pub fn vertical(
     drawing: &mut Drawing,
     axis: &Axis,
@@ -76,8 +79,7 @@ pub fn vertical(
     height: f64,
     labelled: bool,
     grid: Option<f64>,
-) -> f64 {
-    let mut widest: f64 = 0.0;
+) {
     for (value, name) in &axis.ticks {
         let Some(fraction) = axis.fraction(*value) else {
             continue;
@@ -89,11 +91,9 @@ pub fn vertical(
         }
         drawing.line(&[(left - TICK, y), (left, y)], INK, HAIR, None);
         if labelled {
-            widest = widest.max(text::width(name, SMALL));
             drawing.note((left - TICK - 2.0, y), Anchor::End, name);
         }
     }
-    widest
 }
 
 #[cfg(test)]

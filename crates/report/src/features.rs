@@ -1,11 +1,14 @@
 //! Features of a run derived from its tables: kind, scales, pair, phases and key instants.
 
 use glam::DVec3;
-use grainwake_formats::events::Event;
+use grainwake_formats::events::{Event, EventKind};
 use grainwake_plot::minus;
 
 use crate::phases::{self, Instant, PairEvent, Phase};
 use crate::run_folder::{History, RunFolder};
+
+/// Part of the diameter below which a distance is round-off.
+const ROUND_OFF: f64 = 1e-6;
 
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,9 +50,14 @@ pub struct RunFeatures {
     pub kind: RunKind,
     /// Scales; `None` without diameter or gravity.
     pub scales: Option<Scales>,
+    /// Whether gravity is known and not zero.
+    pub has_gravity: bool,
     /// Unit vector against gravity; +z if gravity is unknown or zero.
     pub up: DVec3,
-    /// Trailing and leading grain of a pair at the start; of grains that rise the upper one leads.
+    /// Unit vector from the leading to the trailing grain of a pair that moves in line: up or, if
+    /// the grains rise, down. Without gravity against their mean displacement.
+    pub back: DVec3,
+    /// Trailing and leading grain of a pair at the start, by their positions along `back`.
     pub pair: Option<[usize; 2]>,
     /// Phases of a pair.
     pub phases: Vec<Phase>,
@@ -76,19 +84,26 @@ impl RunFeatures {
             _ => RunKind::Many,
         };
         let gravity = run.facts.gravity.unwrap_or(DVec3::ZERO);
+        let has_gravity = gravity.length() > 0.0;
         let up = (-gravity).try_normalize().unwrap_or(DVec3::Z);
-        let diameter = run.facts.diameter().filter(|_| gravity.length() > 0.0);
+        let diameter = run.facts.diameter().filter(|_| has_gravity);
         let scales = diameter.map(|diameter| Scales { diameter, gravity: gravity.length() });
         let end = run.end();
-        let back = if rises(run, &moving) { -up } else { up };
+        let back = match has_gravity {
+            true if rises(run, &moving) => -up,
+            true => up,
+            false => (-displacement(run)).try_normalize().unwrap_or(up),
+        };
         let height = |i: usize| run.grains[i].position[0].dot(back);
         let pair = match moving[..] {
             [a, b] if height(a) >= height(b) => Some([a, b]),
             [a, b] => Some([b, a]),
             _ => None,
         };
+        // A pair is observed until a grain leaves the box.
+        let together = phases::first(&run.events, EventKind::Left).map_or(end, |t| t.min(end));
         let phases = pair.map_or(Vec::new(), |_| {
-            phases::phases(&run.events, run.summary_number("tumble_time_s"), end)
+            phases::phases(&run.events, run.summary_number("tumble_time_s"), together)
         });
         let of_pair =
             |moment: fn(&[Event]) -> Option<PairEvent>| pair.and_then(|_| moment(&run.events));
@@ -102,13 +117,17 @@ impl RunFeatures {
         let instants = match kind {
             RunKind::Flow => last(),
             RunKind::Single if !travels => last(),
-            RunKind::Pair => phases::pair_instants(&phases, &run.events, closest(run, pair), end),
-            _ => phases::even_instants(end),
+            RunKind::Pair => {
+                phases::pair_instants(&phases, &run.events, closest(run, pair), together)
+            }
+            _ => phases::even_instants(run.last_row()),
         };
         RunFeatures {
             kind,
             scales,
+            has_gravity,
             up,
+            back,
             pair,
             phases,
             kiss: of_pair(phases::kiss),
@@ -117,6 +136,40 @@ impl RunFeatures {
             travels,
             end,
         }
+    }
+
+    /// Returns the name of the velocity along `up` in captions.
+    pub fn vertical_velocity(&self) -> &'static str {
+        if self.has_gravity { "Vertical velocity (down is negative)" } else { "Velocity along z" }
+    }
+
+    /// Returns the name of the speed normal to `up` in captions.
+    pub fn horizontal_speed(&self) -> &'static str {
+        if self.has_gravity { "Horizontal speed" } else { "Speed normal to z" }
+    }
+
+    /// Returns whether a speed [m/s] moves a grain by more than round-off during the run.
+    pub fn is_motion(&self, run: &RunFolder, speed: f64) -> bool {
+        speed * self.end > ROUND_OFF * run.facts.diameter().unwrap_or(0.0)
+    }
+
+    /// Returns the direction of a velocity in words or, without gravity, as a unit vector.
+    pub fn direction_text(&self, velocity: DVec3) -> String {
+        let direction = velocity.normalize_or_zero();
+        if !self.has_gravity {
+            // The sum with zero turns -0 into 0.
+            let parts = direction.to_array().map(|x| (100.0 * x).round() / 100.0 + 0.0);
+            let parts = parts.map(|x| minus(&format!("{x:.2}")));
+            return format!("in the direction ({})", parts.join(", "));
+        }
+        let text = match direction.dot(self.up) {
+            part if part > 0.95 => "upwards",
+            part if part < -0.95 => "downwards",
+            part if part > 0.1 => "obliquely upwards",
+            part if part < -0.1 => "obliquely downwards",
+            _ => "horizontally",
+        };
+        text.to_owned()
     }
 
     /// Returns the name of a grain in legends.
@@ -172,6 +225,12 @@ fn rises(run: &RunFolder, grains: &[usize]) -> bool {
     let ratio =
         |grain: &usize| Some(run.facts.grains.get(*grain)?.density? / run.facts.fluid_density?);
     !grains.is_empty() && grains.iter().all(|grain| ratio(grain).is_some_and(|ratio| ratio < 1.0))
+}
+
+/// Returns the sum of the displacements of all grains [m].
+fn displacement(run: &RunFolder) -> DVec3 {
+    let ends = run.grains.iter().filter_map(|h| Some((h.position.first()?, h.position.last()?)));
+    ends.map(|(first, last)| *last - *first).sum()
 }
 
 /// Returns the time of the smallest gap between the surfaces or, if the gap is unknown, of the
@@ -255,6 +314,39 @@ mod tests {
         assert_eq!(RunFeatures::of(&run).pair, Some([1, 0]));
         run.facts.gravity = Some(DVec3::new(0.0, 0.0, 9.81));
         assert_eq!(RunFeatures::of(&run).pair, Some([0, 1]), "down is where gravity points");
+    }
+
+    #[test]
+    fn the_grain_ahead_leads_without_gravity() {
+        let mut run = RunFolder::default();
+        for (x, path) in [(0.01, 0.02), (0.03, 0.0)] {
+            run.grains.push(History {
+                time: vec![0.0, 1.0],
+                position: vec![DVec3::X * x, DVec3::X * (x + path)],
+                ..History::default()
+            });
+        }
+        assert_eq!(RunFeatures::of(&run).pair, Some([0, 1]));
+        run.grains.swap(0, 1);
+        assert_eq!(RunFeatures::of(&run).pair, Some([1, 0]));
+    }
+
+    #[test]
+    fn directions_are_named() {
+        let mut run = RunFolder::default();
+        let text = |run: &RunFolder, v| RunFeatures::of(run).direction_text(DVec3::from_array(v));
+        assert_eq!(text(&run, [0.0, -1e-9, 0.03]), "in the direction (0.00, 0.00, 1.00)");
+        assert_eq!(text(&run, [-0.3, 0.0, 0.3]), "in the direction (−0.71, 0.00, 0.71)");
+        run.facts.gravity = Some(DVec3::new(0.0, 0.0, -9.81));
+        for (velocity, words) in [
+            ([0.0, 0.0, 0.08], "upwards"),
+            ([0.1, 0.0, -0.9], "downwards"),
+            ([0.5, 0.0, 0.0], "horizontally"),
+            ([0.5, 0.0, -0.2], "obliquely downwards"),
+            ([0.5, 0.0, 0.5], "obliquely upwards"),
+        ] {
+            assert_eq!(text(&run, velocity), words);
+        }
     }
 
     #[test]

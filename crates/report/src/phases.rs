@@ -42,7 +42,7 @@ pub struct Phase {
     pub end: f64,
 }
 
-/// Derives the phases from the events of a run that ends at `end` [s].
+/// Derives the phases from the events of a pair that is observed until `end` [s].
 ///
 /// `tumble` [s] is the start of the tumbling according to the summary; without it, the first role
 /// change in contact starts the tumbling.
@@ -51,6 +51,7 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
     let events = events.iter().map(|event| (event.time, event.kind));
     let mut changes: Vec<(f64, EventKind)> = events.collect();
     changes.extend(tumble.map(|time| (time, EventKind::Tumble)));
+    changes.retain(|(time, _)| *time <= end);
     changes.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut out: Vec<Phase> = Vec::new();
     let (mut state, mut start) = (Drafting, 0.0);
@@ -71,7 +72,7 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
             (state, start) = (next, time);
         }
     }
-    out.push(Phase { kind: state, start, end: end.max(start) });
+    out.push(Phase { kind: state, start, end });
     out.retain(|phase| phase.end > phase.start);
     out
 }
@@ -110,7 +111,7 @@ pub fn separation(events: &[Event]) -> Option<PairEvent> {
 }
 
 /// Returns the time of the first event of a kind [s].
-fn first(events: &[Event], kind: EventKind) -> Option<f64> {
+pub fn first(events: &[Event], kind: EventKind) -> Option<f64> {
     Some(events.iter().find(|event| event.kind == kind)?.time)
 }
 

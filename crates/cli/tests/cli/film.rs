@@ -76,6 +76,12 @@ fn a_film_of_a_dry_run_shows_the_grains_fall() {
 }
 
 #[test]
+fn a_short_interval_of_a_film_is_not_zero() {
+    let (_folder, run) = run(DRY, &["--set", "output.tables=0.2 ms", "--set", "time.end=4 ms"]);
+    film(&run).success().stderr(contains("21 pictures").and(contains(", 0.2 ms of the run apart")));
+}
+
+#[test]
 fn too_few_pictures_are_refused_with_the_remedy() {
     let (folder, run) = run(WET, &[]);
     film(&run).code(2).stderr(contains("at least 8").and(contains("output.slices")));

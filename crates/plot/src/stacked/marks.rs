@@ -6,8 +6,6 @@ use crate::frame::Frame;
 use crate::style::{FAINT, GRID, HAIR, INK, SMALL};
 use crate::text;
 
-/// Margin to the left of the panels [pt].
-pub(super) const LEFT: f64 = 38.0;
 /// Margin to the right of the panels [pt].
 pub(super) const RIGHT: f64 = 8.0;
 /// Height of a row of names [pt].
@@ -47,17 +45,18 @@ pub fn draw(
     }
     for (row, at, name) in names {
         let y = frame.y - 3.0 - ROW * *row as f64;
-        let (centre, _) = centre_and_half_width(name, *at, frame.width);
+        let (centre, _) = centre_and_half_width(name, *at, (frame.x, frame.width));
         drawing.note_with_halo((frame.x + centre, y), Anchor::Middle, INK, name);
     }
 }
 
 /// Returns positions of the names without overlap: row, distance from the left edge [pt], name.
-/// Of consecutive marks with one name only the first is named. Names without room are omitted.
+/// The panels have the margin `left` and the given width [pt]. Of consecutive marks with one name
+/// only the first is named. Names without room are omitted.
 pub fn name_positions<'a>(
     x: &Axis,
     marks: &'a [VerticalMark],
-    width: f64,
+    (left, width): (f64, f64),
 ) -> Vec<(usize, f64, &'a str)> {
     let mut ends = [f64::NEG_INFINITY; LABEL_ROWS];
     let mut out = Vec::new();
@@ -71,7 +70,7 @@ pub fn name_positions<'a>(
             continue;
         };
         let at = fraction * width;
-        let (centre, half) = centre_and_half_width(&mark.name, at, width);
+        let (centre, half) = centre_and_half_width(&mark.name, at, (left, width));
         if let Some(row) = ends.iter().position(|end| centre - half > end + 4.0) {
             ends[row] = centre + half;
             out.push((row, at, mark.name.as_str()));
@@ -85,10 +84,11 @@ fn fraction_inside(axis: &Axis, mark: &VerticalMark) -> Option<f64> {
     axis.fraction(mark.at).filter(|fraction| (0.0..=1.0).contains(fraction))
 }
 
-/// Returns the centre, kept on the drawing, and half the width of a name at `at` [pt].
-fn centre_and_half_width(name: &str, at: f64, width: f64) -> (f64, f64) {
+/// Returns the centre, kept on the drawing, and half the width of a name at `at` [pt]; the panels
+/// have the margin `left` and the given width.
+fn centre_and_half_width(name: &str, at: f64, (left, width): (f64, f64)) -> (f64, f64) {
     let half = 0.5 * text::width(name, SMALL);
-    let centre = at.clamp(half - LEFT + 12.0, (width + RIGHT - half).max(half));
+    let centre = at.clamp(half - left + 12.0, (width + RIGHT - half).max(half));
     (centre, half)
 }
 
@@ -111,7 +111,7 @@ mod tests {
             mark(5.5, "one too many"),
             mark(99.0, "outside"),
         ];
-        let placed = name_positions(&x, &marks, 200.0);
+        let placed = name_positions(&x, &marks, (38.0, 200.0));
         assert_eq!(
             placed.iter().map(|(row, _, name)| (*row, *name)).collect::<Vec<_>>(),
             [(0, "kiss"), (1, "role change"), (2, "separation"), (3, "landing"), (4, "rest")]

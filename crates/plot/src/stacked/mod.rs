@@ -7,12 +7,17 @@ use crate::curve;
 use crate::drawing::{Anchor, Drawing};
 use crate::frame::Frame;
 use crate::legend::{Entry, Legend};
-use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT};
+use crate::style::{COLUMN, FAINT, LINE, SMALL, TEXT, TICK};
 use crate::text;
 use crate::ticks;
 
 pub use marks::VerticalMark;
-use marks::{LEFT, RIGHT, ROW};
+use marks::{RIGHT, ROW};
+
+/// Smallest margin to the left of the panels [pt].
+const LEFT: f64 = 38.0;
+/// Baseline of the labels of the vertical axes [pt].
+const LABEL: f64 = 9.0;
 
 /// A curve.
 #[derive(Clone, Debug)]
@@ -56,6 +61,12 @@ impl Series {
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         self.points.iter().map(|point| point.1)
     }
+
+    /// Returns the point whose value has the largest magnitude; `None` without finite values.
+    pub fn peak(&self) -> Option<(f64, f64)> {
+        let finite = self.points.iter().copied().filter(|point| point.1.is_finite());
+        finite.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
 }
 
 /// A panel with its curves.
@@ -95,8 +106,11 @@ impl Panel {
 
 /// Draws the panels over one horizontal axis, in a drawing of one column width.
 pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) -> Drawing {
-    let width = COLUMN - LEFT - RIGHT;
-    let names = marks::name_positions(x, verticals, width);
+    // The descenders of an axis label and its distance from the tick labels take 4.5 pt.
+    let widest = panels.iter().map(|panel| ticks::widest(&panel.y)).fold(0.0, f64::max);
+    let left = LEFT.max(LABEL + 4.5 + widest + TICK + 2.0);
+    let width = COLUMN - left - RIGHT;
+    let names = marks::name_positions(x, verticals, (left, width));
     let rows = names.iter().map(|(row, _, _)| row + 1).max().unwrap_or(0);
     let names_of = |panel: &Panel| -> Vec<Option<String>> {
         panel.series.iter().map(|s| s.name.clone()).collect()
@@ -119,10 +133,10 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
     let mut drawing = Drawing::new(COLUMN, heights + 26.0);
     let mut y = 0.0;
     for (i, panel) in panels.iter().enumerate() {
-        legends[i].draw(&mut drawing, (LEFT, y + 7.0));
+        legends[i].draw(&mut drawing, (left, y + 7.0));
         y += top(i);
         let frame = Frame {
-            x: LEFT,
+            x: left,
             y,
             width,
             height: height(panel),
@@ -134,7 +148,7 @@ pub fn stacked_panels(x: &Axis, panels: &[Panel], verticals: &[VerticalMark]) ->
         draw_panel(&mut drawing, &frame, panel, i);
         y += frame.height;
         let last = i + 1 == panels.len();
-        ticks::horizontal(&mut drawing, x, (LEFT, y), width, last);
+        ticks::horizontal(&mut drawing, x, (left, y), width, last);
         if last {
             frame.horizontal_label(&mut drawing);
         }
@@ -166,7 +180,7 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, index: usize)
         drawing.note_with_halo(place, Anchor::Start, FAINT, note);
     }
     drawing.outline(x, y, width, height);
-    drawing.upward_text((9.0, y + 0.5 * height), &panel.y.label);
+    drawing.upward_text((LABEL, y + 0.5 * height), &panel.y.label);
 }
 
 /// Returns the left end and baseline [pt] where the note of a reference line at height `y` covers
@@ -194,6 +208,36 @@ fn note_position(frame: &Frame, panel: &Panel, y: f64, width: f64) -> (f64, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_margin_follows_the_widest_tick_label() {
+        let x = Axis::linear("t", 0.0, 10.0, 5, AxisRange::Tight);
+        let panel = |low: f64| {
+            let points = vec![(0.0, low), (10.0, 0.0)];
+            Panel::linear("*v*_{z}  [m/s]", vec![Series::new(points, FAINT)], &[], 60.0)
+        };
+        // Left edges of the frames, which are the only rectangles with an outline.
+        let edges = |panels: &[Panel]| -> Vec<f64> {
+            let svg = stacked_panels(&x, panels, &[]).to_svg("f", "t", "d");
+            let document = resvg::usvg::roxmltree::Document::parse(&svg).unwrap();
+            let rects = document.descendants().filter(|node| node.has_tag_name("rect"));
+            let outlines = rects.filter(|rect| rect.attribute("fill") == Some("none"));
+            outlines.map(|rect| rect.attribute("x").unwrap().parse().unwrap()).collect()
+        };
+        assert_eq!(edges(&[panel(-1.0)]), [LEFT]);
+        let wide = panel(-0.0174);
+        let needed = LABEL + 3.0 + text::width("−0.015", SMALL) + TICK + 2.0;
+        assert!(wide.y.ticks.iter().any(|(_, name)| name == "−0.015"), "{:?}", wide.y.ticks);
+        let both = edges(&[panel(-1.0), wide]);
+        assert!(both[0] > LEFT && both[0] > needed && both[0] == both[1], "{both:?}");
+    }
+
+    #[test]
+    fn the_peak_has_the_largest_magnitude() {
+        let points = vec![(0.0, 1.0), (1.0, -3.0), (2.0, f64::NAN), (3.0, 2.0)];
+        assert_eq!(Series::new(points, FAINT).peak(), Some((1.0, -3.0)));
+        assert_eq!(Series::new(vec![(0.0, f64::NAN)], FAINT).peak(), None);
+    }
 
     #[test]
     fn notes_keep_off_the_curves() {

@@ -16,7 +16,7 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let scaled = features.scales.is_some();
     let unit = features.scales.map_or(1.0, |s| s.diameter);
     let centres = scene.pair_curve(|r| r.length() / unit)?;
-    let tilt = scene.pair_curve(|r| r.angle_between(features.up).to_degrees())?;
+    let tilt = scene.pair_curve(|r| r.angle_between(features.back).to_degrees())?;
     let closest = centres.iter().map(|p| p.1).min_by(f64::total_cmp)?;
     let (first, last) = (centres.first()?.1, centres.last()?.1);
     let mut curves = vec![Series::new(centres, style::INK).named("centres, *D*_{r}")];
@@ -26,6 +26,9 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
         let curve = Series::new(points, style::BLUE).named("surfaces");
         curves.push(curve.dashed("4 1.5"));
     }
+    let left = scene.run.events.iter().find(|event| event.kind == EventKind::Left);
+    let end = left.and_then(|event| event.grains.first());
+    let end = end.map_or("at the end".to_owned(), |n| format!("when grain {n} leaves the box"));
     let (label, unit) = match scaled {
         true => ("distance / *d*  [–]", "diameters"),
         false => ("distance  [m]", "m"),
@@ -39,13 +42,13 @@ pub fn gap(scene: &Scene) -> Option<Figure> {
     let mut angle = Panel::with_axis(axis, vec![Series::new(tilt, style::GREEN)], 70.0);
     angle.levels.push((90.0, "side by side".to_owned()));
     let mut caption = format!(
-        "(a) Distance D_{{r}} of the two centres: {} {unit} at the start, at least {}, and {} at \
-         the end. (b) Angle between the vertical and the line from the grain that leads at the \
-         start to the one that trails: 0° one above the other, 90° side by side, larger after a \
-         role change.",
+        "(a) Distance D_{{r}} of the two centres: {} {unit} at the start, at least {}, and {} \
+         {end}. (b) Angle between {} and the line from the grain that leads at the start to the \
+         one that trails: 0° one behind the other, 90° side by side, larger after a role change.",
         short(first),
         short(closest),
-        short(last)
+        short(last),
+        if features.has_gravity { "the vertical" } else { "the mean direction of motion" }
     );
     let role_change = scene.run.events.iter().find(|event| event.kind == EventKind::RoleChange);
     for (text, time) in [
@@ -71,17 +74,18 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
     let vertical = pair.map(|grain| scene.curve(grain, |h, row| h.velocity[row].dot(up) / unit));
     let speed = |h: &History, row: usize| h.velocity[row].reject_from_normalized(up).length();
     let horizontal = pair.map(|grain| scene.curve(grain, |h, row| speed(h, row) / unit));
-    let fastest = vertical.each_ref().map(|curve| curve.values().fold(0.0, f64::min));
+    let [trailing, leading] =
+        vertical.each_ref().map(|curve| short(curve.peak().map_or(0.0, |peak| peak.1)));
     let sideways = horizontal.iter().flat_map(Series::values).fold(0.0, f64::max);
     let (v, h, unit) = match scene.features.scales {
         Some(_) => ("*v*_{z} / √(*d* *g*)  [–]", "|*v*_{h}| / √(*d* *g*)  [–]", " √(d g)"),
         None => ("*v*_{z}  [m/s]", "|*v*_{h}|  [m/s]", " m/s"),
     };
     let caption = format!(
-        "(a) Vertical velocity of both grains (down is negative): the grain that trails at the \
-         start reaches {}{unit}, the other {}{unit}. (b) Horizontal speed, up to {}{unit}.",
-        short(fastest[0]),
-        short(fastest[1]),
+        "(a) {} of both grains: the grain that trails at the start reaches {trailing}{unit}, the \
+         other {leading}{unit}. (b) {}, up to {}{unit}.",
+        scene.features.vertical_velocity(),
+        scene.features.horizontal_speed(),
         short(sideways)
     );
     let panels = [
@@ -104,17 +108,14 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         |value: &dyn Fn(&History, usize) -> f64| Series { name: None, ..scene.curve(grain, value) };
     let vertical = curve(&|h, row| h.velocity[row].dot(up));
     let horizontal = curve(&|h, row| h.velocity[row].reject_from_normalized(up).length());
-    let largest = |curve: &Series| {
-        let points = curve.points.iter().copied();
-        points.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-    };
-    let (peak, sideways) = (largest(&vertical)?, largest(&horizontal)?);
+    let (peak, sideways) = (vertical.peak()?, horizontal.peak()?);
     let fastest = peak.1.abs().max(sideways.1);
     let mut panels = Vec::new();
     let mut sentences = Vec::new();
     if peak.1.abs() >= ROUND_OFF * fastest {
         sentences.push(format!(
-            "Vertical velocity (down is negative); the largest is {} m/s at *t* = {} s.",
+            "{}; the largest is {} m/s at *t* = {} s.",
+            scene.features.vertical_velocity(),
             short(peak.1),
             short(peak.0)
         ));
@@ -127,19 +128,24 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
         }
     }
     if sideways.1 > SIDEWAYS * fastest {
-        sentences.push(format!("Horizontal speed, up to {} m/s.", short(sideways.1)));
+        let name = scene.features.horizontal_speed();
+        sentences.push(format!("{name}, up to {} m/s.", short(sideways.1)));
         panels.push(Panel::linear("|*v*_{h}|  [m/s]", vec![horizontal], &[0.0], 65.0));
     }
-    if let (Some(diameter), Some(viscosity)) = (facts.diameter(), facts.viscosity) {
-        let reynolds = curve(&|h, row| h.velocity[row].length() * diameter / viscosity);
+    let fluid = facts.viscosity.filter(|_| facts.inflow.is_some());
+    if let (Some(diameter), Some(viscosity)) = (facts.diameter(), fluid) {
+        let speed = |h: &History, row: usize| facts.relative_speed(h.velocity[row]);
+        let number = |speed: f64| speed * diameter / viscosity;
+        let reynolds = curve(&|h, row| speed(h, row).map_or(f64::NAN, number));
         let highest = short(reynolds.values().fold(0.0, f64::max));
-        let label = "Re = |*v*| *d*/*ν*  [–]";
-        panels.push(Panel::linear(label, vec![reynolds], &[0.0], 65.0));
+        let label = format!("Re = {} *d*/*ν*  [–]", facts.relative_speed_symbol());
+        panels.push(Panel::linear(&label, vec![reynolds], &[0.0], 65.0));
         let number = scene.features.scales.zip(facts.density_ratio());
         let galileo = number.map_or(String::new(), |(scales, ratio)| {
             format!(" (Galileo number {})", short(galileo(scales, ratio, viscosity)))
         });
-        sentences.push(format!("Reynolds number, up to {highest}{galileo}."));
+        let relative = if facts.has_inflow() { " of the speed relative to the inflow" } else { "" };
+        sentences.push(format!("Reynolds number{relative}, up to {highest}{galileo}."));
     }
     let caption = lettered(&sentences);
     Some(scene.with_events("velocity", "Velocity of the grain", caption, &panels))

@@ -1,7 +1,7 @@
 //! Curves against time: several or many grains, the force of the fluid, the diagnostics.
 
 use grainwake_plot::stacked::{Panel, Series};
-use grainwake_plot::{Figure, letter, style};
+use grainwake_plot::{Figure, lettered, style};
 
 use super::scene::{AXES, Points, Scene};
 use crate::features::short;
@@ -66,22 +66,21 @@ pub fn each(scene: &Scene) -> Option<Figure> {
         };
         moving.iter().enumerate().map(one).collect()
     };
-    let fastest = |grain: &usize| {
-        let speeds = scene.run.grains[*grain].velocity.iter().map(|v| -v.dot(up));
-        let speed = speeds.max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        Some(format!("{} of grain {grain}", short(speed)))
-    };
-    let fastest: Vec<String> = moving.iter().filter_map(fastest).collect();
     let height = curves(&|h, row| 1e3 * h.position[row].dot(up));
     let velocity = curves(&|h, row| h.velocity[row].dot(up));
+    let peak = |(grain, curve): (&usize, &Series)| {
+        Some(format!("{} of grain {grain}", short(curve.peak()?.1)))
+    };
+    let peaks: Vec<String> = moving.iter().zip(&velocity).filter_map(peak).collect();
     let panels = [
         Panel::linear("height  [mm]", height, &[], 110.0),
         Panel::linear("*v*_{z}  [m/s]", velocity, &[0.0], 110.0),
     ];
     let caption = format!(
-        "(a) Height of the centre of each grain. (b) Vertical velocity (down is negative); the \
-         largest settling speeds [m/s] are {}.",
-        fastest.join(", ")
+        "(a) Height of the centre of each grain. (b) {}; the values of largest magnitude [m/s] \
+         are {}.",
+        scene.features.vertical_velocity(),
+        peaks.join(", ")
     );
     let title = "Height and velocity of each grain";
     Some(scene.with_events("grains", title, caption, &panels))
@@ -108,7 +107,7 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     Some(scene.with_events("force", "Force of the fluid", caption, &panels))
 }
 
-/// Draws the conservation checks: divergence, CFL number, momentum residual, kinetic energy.
+/// Draws the divergence, the CFL number, the residual of the momentum and the kinetic energy.
 pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     let points = |names: &[&str]| {
         let points = scene.diagnostic(names)?;
@@ -125,10 +124,10 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         short(overall.max(peak(points)))
     };
     let mut panels = Vec::new();
-    let mut parts = Vec::new();
+    let mut sentences = Vec::new();
     if let Some(divergence) = points(&["max_divergence", "divergence"]) {
-        parts.push(format!(
-            "largest divergence after projection, at most {} 1/s after any step",
+        sentences.push(format!(
+            "Largest divergence after projection, at most {} 1/s after any step.",
             highest("max_divergence", &divergence)
         ));
         let curve = Series::new(divergence, style::BLUE);
@@ -136,16 +135,16 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     }
     if let Some(cfl) = points(&["cfl"]) {
         let largest = highest("max_cfl", &cfl);
-        parts.push(format!("CFL number, at most {largest} in any step"));
+        sentences.push(format!("CFL number, at most {largest} in any step."));
         let curve = Series::new(cfl, style::INK);
         panels.push(Panel::linear("CFL  [–]", vec![curve], &[0.0], 60.0));
     }
     if let Some(residual) = points(&["momentum_residual"]) {
         let residual: Points = residual.into_iter().map(|(t, v)| (t, v.abs())).collect();
-        parts.push(format!(
-            "change of the momentum of fluid, grains and walls in a step that no force accounts \
+        sentences.push(format!(
+            "Change of the momentum of fluid, grains and walls in a step that no force accounts \
              for, relative to the mass of the fluid times its largest velocity, at most {} in the \
-             rows of the table",
+             rows of the table.",
             short(peak(&residual))
         ));
         let curve = Series::new(residual, style::PURPLE);
@@ -158,14 +157,13 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     };
     let energies: Vec<Series> = [fluid, grains].into_iter().filter_map(energy).collect();
     if !energies.is_empty() {
-        parts.push("kinetic energy".to_owned());
+        let names: Vec<&str> = energies.iter().filter_map(|e| e.name.as_deref()).collect();
+        sentences.push(format!("Kinetic energy of the {}.", names.join(" and of the ")));
         panels.push(Panel::linear("energy  [J]", energies, &[0.0], 80.0));
     }
     if panels.is_empty() {
         return None;
     }
-    let parts = parts.iter().enumerate();
-    let parts: Vec<String> = parts.map(|(i, part)| format!("{} {part}", letter(i))).collect();
-    let caption = format!("Conservation checks: {}.", parts.join("; "));
+    let caption = lettered(&sentences);
     Some(scene.without_events("diagnostics", "Diagnostics", caption, &panels))
 }

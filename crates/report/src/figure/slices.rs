@@ -165,7 +165,11 @@ fn planes(scene: &Scene, columns: &[Column]) -> String {
     let times = match columns {
         [only] => only.time.clone(),
         _ => {
-            let time = |column: &Column| format!("{}, {}", column.title.trim(), column.time);
+            // Instants without a name have a letter only.
+            let time = |column: &Column| match column.title.trim() {
+                letter if letter.ends_with(')') => format!("{letter} {}", column.time),
+                title => format!("{title}, {}", column.time),
+            };
             columns.iter().map(time).collect::<Vec<_>>().join("; ")
         }
     };

@@ -9,6 +9,7 @@ use grainwake_plot::{Figure, letter};
 
 use super::scene::{AXES, Scene};
 use crate::features::short;
+use crate::phases::Instant;
 
 /// Left margin [pt].
 const LEFT: f64 = 36.0;
@@ -58,8 +59,9 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         let height = (i == 0).then_some(height.as_str());
         frame.frame(&mut drawing, (Some(&across), height));
     }
-    label_instants(scene, &grains, &frames[1], up, &mut drawing);
-    let name = |(i, instant): (usize, &crate::phases::Instant)| {
+    let marked = longest(scene, &grains)?;
+    label_instants(scene, marked, &frames[1], up, &mut drawing);
+    let name = |(i, instant): (usize, &Instant)| {
         let name = match instant.name {
             "" => String::new(),
             name => format!("{name}, "),
@@ -77,6 +79,9 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         true => ".".to_owned(),
         false => format!(" at the start (pale) and at {}.", named.join("; ")),
     };
+    if grains.len() > 1 && !named.is_empty() {
+        caption += &format!(" The letters are at the height of grain {marked}.");
+    }
     caption += &scene.left_out(&grains);
     if let Some(drift) = largest_drift(scene, &grains, up) {
         caption += &format!(" Largest sideways drift: {} mm.", short(1e3 * drift));
@@ -151,30 +156,51 @@ fn draw_path(
     }
 }
 
-/// Draws the letters of the instants to the right of the frame, at the mean height of the grains,
-/// without overlap.
+/// Returns the grain with the longest history, which is in the box at all key instants.
+fn longest(scene: &Scene, grains: &[usize]) -> Option<usize> {
+    // The first one of equal length.
+    grains.iter().copied().rev().max_by_key(|grain| scene.run.grains[*grain].len())
+}
+
+/// Draws the letters of the instants to the right of the frame, at the heights of a grain, without
+/// overlap.
 fn label_instants(
     scene: &Scene,
-    grains: &[usize],
+    grain: usize,
     frame: &EqualAspectFrame,
     up: usize,
     drawing: &mut Drawing,
 ) {
-    let mut places: Vec<(f64, String)> = Vec::new();
-    for (i, instant) in scene.instants.iter().enumerate() {
-        let histories = grains.iter().map(|g| &scene.run.grains[*g]);
-        let positions = histories.filter_map(|h| Some(h.position[h.nearest(instant.time)?]));
-        let heights: Vec<f64> = positions.map(|p| scene.run.wrapped(p)[up]).collect();
-        let mean = heights.iter().sum::<f64>() / heights.len().max(1) as f64;
-        places.push((frame.at((0.0, mean)).1, letter(i)));
-    }
+    let history = &scene.run.grains[grain];
+    let ((left, top), bottom) = (frame.corner, frame.corner.1 + frame.height());
+    let place = |(i, instant): (usize, &Instant)| {
+        let position = scene.run.wrapped(history.position[history.nearest(instant.time)?]);
+        // Equal heights but for round-off keep the order of the instants.
+        let y = (2.0 * frame.at((0.0, position[up])).1).round() / 2.0;
+        Some((y.clamp(top, bottom), letter(i)))
+    };
+    let mut places: Vec<(f64, String)> =
+        scene.instants.iter().enumerate().filter_map(place).collect();
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut last = f64::NEG_INFINITY;
-    let x = frame.corner.0 + frame.width();
-    for (y, name) in places {
-        last = y.max(last + SMALL + 1.0);
-        drawing.line(&[(x, y), (x + 3.0, last)], style::FAINT, style::HAIR, None);
-        drawing.note((x + 4.0, last), Anchor::Start, &name);
+    let mut texts: Vec<f64> = places.iter().map(|(y, _)| *y).collect();
+    spread(&mut texts, SMALL + 1.0, bottom);
+    let x = left + frame.width();
+    for ((y, name), text) in places.iter().zip(texts) {
+        drawing.line(&[(x, *y), (x + 3.0, text)], style::FAINT, style::HAIR, None);
+        drawing.note((x + 4.0, text), Anchor::Start, name);
+    }
+}
+
+/// Moves ascending positions apart to at least `distance`: first forwards, then back below `limit`.
+fn spread(positions: &mut [f64], distance: f64, mut limit: f64) {
+    let mut least = f64::NEG_INFINITY;
+    for position in &mut *positions {
+        *position = position.max(least);
+        least = *position + distance;
+    }
+    for position in positions.iter_mut().rev() {
+        *position = position.min(limit);
+        limit = *position - distance;
     }
 }
 
@@ -188,4 +214,16 @@ fn largest_drift(scene: &Scene, grains: &[usize], up: usize) -> Option<f64> {
         Some(distances.fold(0.0, f64::max))
     };
     grains.iter().filter_map(drift).reduce(f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn close_letters_are_spread_within_the_frame() {
+        let mut positions = [1.0, 2.0, 19.0, 20.0];
+        spread(&mut positions, 5.0, 20.0);
+        assert_eq!(positions, [1.0, 6.0, 15.0, 20.0]);
+    }
 }

@@ -44,7 +44,7 @@ fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
     let general = match features.kind {
         RunKind::Flow => "Flow without grains",
         RunKind::Single => "One grain",
-        RunKind::Pair => "Settling pair",
+        RunKind::Pair => "Two grains",
         RunKind::Many => "Many grains",
     };
     run.facts.title.as_deref().unwrap_or(general)
@@ -91,11 +91,14 @@ fn pair_sentence(features: &RunFeatures) -> String {
 }
 
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
-    let velocities = run.grains.iter().flat_map(|h| &h.velocity);
-    let peak = velocities.map(|v| -v.dot(features.up)).fold(0.0, f64::max);
-    match peak > 0.0 {
-        true => format!("The grain reached {} m/s downwards. ", short(peak)),
-        false => String::new(),
+    let velocities = run.grains.iter().flat_map(|h| &h.velocity).filter(|v| v.is_finite());
+    let fastest = velocities.max_by(|a, b| a.length().total_cmp(&b.length()));
+    match fastest.filter(|v| features.is_motion(run, v.length())) {
+        Some(v) => {
+            let direction = features.direction_text(*v);
+            format!("The grain reached {} m/s {direction}. ", short(v.length()))
+        }
+        None => String::new(),
     }
 }
 

@@ -28,10 +28,10 @@ impl Rows {
         }
     }
 
-    /// Adds a row with a value in the font of code.
+    /// Adds a row with a value, in label markup, in the font of code.
     fn add_code(&mut self, name: &str, value: &str) {
         let name = name.replace('_', " ");
-        self.0.push((html! { (name) }, html! { code { (value) } }));
+        self.0.push((html! { (name) }, html! { code { (label(value)) } }));
     }
 }
 
@@ -63,10 +63,15 @@ fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let name = format!("Galileo number √(|*ρ*_{{p}}/*ρ*_{{f}} − 1| *g* *d*^{{3}}) / *ν*{suffix}");
     let known = features.scales.zip(ratio).zip(viscosity);
     rows.add(&name, known.map(|((scales, ratio), nu)| short(galileo(scales, ratio, nu))));
-    let speeds = run.grains.iter().flat_map(|h| &h.velocity).map(|v| v.length());
-    let fastest = speeds.filter(|v| v.is_finite()).fold(0.0, f64::max);
-    let reynolds = diameter.zip(viscosity).map(|(d, nu)| short(fastest * d / nu));
-    rows.add("Reynolds number at the largest speed, |*v*| *d* / *ν*", reynolds);
+    let velocities = run.grains.iter().flat_map(|h| &h.velocity);
+    let speeds = velocities.filter_map(|v| facts.relative_speed(*v));
+    let fastest = speeds.filter(|v| v.is_finite()).reduce(f64::max);
+    let fastest = fastest.filter(|speed| features.is_motion(run, *speed));
+    let known = fastest.zip(diameter).zip(viscosity);
+    let relative = if facts.has_inflow() { " relative to the inflow" } else { "" };
+    let symbol = facts.relative_speed_symbol();
+    let name = format!("Reynolds number at the largest speed{relative}, {symbol} *d* / *ν*");
+    rows.add(&name, known.map(|((speed, d), nu)| short(speed * d / nu)));
     let (time, velocity) = features.scales.map(|s| (s.time(), s.velocity())).unzip();
     rows.add("time scale √(*d*/*g*)", time.map(with_unit("s")));
     rows.add("velocity scale √(*d* *g*)", velocity.map(with_unit("m/s")));
@@ -110,7 +115,7 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     rows.add("wall time", run.summary_number("wall_s").map(duration));
     rows.add("CPU time of all threads", run.summary_number("cpu_s").map(duration));
     rows.add("scales of the columns ending in _scaled", table_scales(run));
-    let divergence = run.summary_number("max_divergence");
+    let divergence = run.summary_number("max_divergence").filter(|_| facts.fluid_density.is_some());
     let divergence = divergence.map(|d| format!("{} 1/s", short(d)));
     rows.add("largest divergence after projection", divergence);
     rows
@@ -258,11 +263,11 @@ fn flatten(rows: &mut Rows, name: &str, value: &Value, depth: usize) {
         }
         Value::Array(list) if list.iter().all(simple) => {
             let texts: Vec<String> = list.iter().map(text).collect();
-            rows.add_code(name, &texts.join(" "));
+            rows.add_code(name, &literal(&texts.join(" ")));
         }
         Value::Array(list) if name.ends_with("passes") => {
             let pass = |pass: &Value| {
-                let name = pass.get("name").map(text).unwrap_or_default();
+                let name = literal(&pass.get("name").map(text).unwrap_or_default());
                 let wall = pass.get("wall_s").and_then(Value::as_f64);
                 format!("{name} {}", wall.map_or("not known".to_owned(), duration))
             };
@@ -277,7 +282,7 @@ fn flatten(rows: &mut Rows, name: &str, value: &Value, depth: usize) {
                 rows.add_code(name, &format!("and {} more", list.len() - SESSIONS));
             }
         }
-        other => rows.add_code(name, &text(other)),
+        other => rows.add_code(name, &literal(&text(other))),
     }
 }
 
@@ -285,7 +290,7 @@ fn text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// Returns a wall time in seconds, minutes or hours.
+/// Returns a wall time in seconds, minutes or hours, in label markup.
 pub fn duration(seconds: f64) -> String {
     let parts =
         |unit: f64, small: f64| ((seconds / unit).floor(), (seconds % unit / small).floor());

@@ -154,3 +154,9 @@ fn instants_move_to_what_was_written() {
     assert_eq!(got, [1.1, 3.8], "two instants on one file are shown once");
     assert!(snap(&instants, &[]).is_empty());
 }
+
+#[test]
+fn events_after_the_observation_change_no_phase() {
+    let events = log(&[(1.0, EventKind::Kiss), (2.0, EventKind::Left), (3.0, EventKind::Landing)]);
+    assert_eq!(kinds(&phases(&events, None, 2.0)), [(Drafting, 0.0, 1.0), (Kissing, 1.0, 2.0)]);
+}

@@ -29,7 +29,7 @@ pub struct Facts {
     pub lower: DVec3,
     /// Edge lengths of the box [m].
     pub size: Option<DVec3>,
-    /// Cells along x, y, z.
+    /// Cells along x, y, z; `None` for a dry run.
     pub cells: Option<[usize; 3]>,
     /// Conditions on the faces, `[axis][side]`.
     pub boundaries: Option<[[String; 2]; 3]>,
@@ -39,7 +39,9 @@ pub struct Facts {
     pub fluid_density: Option<f64>,
     /// Kinematic viscosity of the fluid [m^2/s].
     pub viscosity: Option<f64>,
-    /// Coupling scheme.
+    /// Velocity of the inflow [m/s]: zero without one, `None` if it differs between faces.
+    pub inflow: Option<DVec3>,
+    /// Coupling scheme; `None` for a dry run.
     pub scheme: Option<String>,
     /// Whether the fields are in single precision.
     pub single_precision: bool,
@@ -57,6 +59,21 @@ impl Facts {
     /// Returns the cell edge along x [m].
     pub fn cell(&self) -> Option<f64> {
         Some(self.size?.x / self.cells?[0] as f64)
+    }
+
+    /// Returns the speed of a grain relative to the inflow [m/s].
+    pub fn relative_speed(&self, velocity: DVec3) -> Option<f64> {
+        Some((velocity - self.inflow?).length())
+    }
+
+    /// Returns the symbol of the relative speed, in label markup.
+    pub fn relative_speed_symbol(&self) -> &'static str {
+        if self.has_inflow() { "|*v* − *U*|" } else { "|*v*|" }
+    }
+
+    /// Returns whether fluid enters through a face.
+    pub fn has_inflow(&self) -> bool {
+        self.inflow.is_some_and(|inflow| inflow != DVec3::ZERO)
     }
 
     /// Returns the mean of the known values of all grains.
@@ -113,17 +130,21 @@ fn facts_of(case: &Value) -> Facts {
     let dynamic = number(case, "/fluid/viscosity");
     let faces = case.pointer("/domain/boundaries");
     let cells = list(case, "/domain/cells", |n| n.as_u64().filter(|n| *n > 0));
+    let sides = ["x", "y", "z"].map(|axis| sides(faces.and_then(|faces| faces.get(axis))));
+    // A dry run has no grid, though its resolved case holds the keys.
+    let wet = density.is_some();
     Facts {
         title: text(case, "/title").filter(|title| !title.is_empty()),
         lower: vector(case, "/domain/origin").unwrap_or(DVec3::ZERO),
         size: vector(case, "/domain/size").filter(|size| size.min_element() > 0.0),
-        cells: cells.map(|cells| cells.map(|n| n as usize)),
-        boundaries: faces.map(|faces| ["x", "y", "z"].map(|axis| conditions(faces.get(axis)))),
+        cells: cells.filter(|_| wet).map(|cells| cells.map(|n| n as usize)),
+        boundaries: faces.map(|_| sides.map(|pair| pair.map(condition))),
+        inflow: inflow(sides.as_flattened()),
         gravity: vector(case, "/gravity"),
         fluid_density: density,
         viscosity: kinematic.or_else(|| Some(dynamic? / density?)),
-        scheme: text(case, "/coupling/scheme"),
-        single_precision: text(case, "/run/precision").as_deref() == Some("f32"),
+        scheme: text(case, "/coupling/scheme").filter(|_| wet),
+        single_precision: wet && text(case, "/run/precision").as_deref() == Some("f32"),
         refinement: case.pointer("/domain/refinement").and_then(Value::as_u64).filter(|n| *n > 1),
         contact_law: text(case, "/contact/law"),
         contact: contact_parameters(case),
@@ -158,18 +179,35 @@ fn list<T>(value: &Value, path: &str, entry: fn(&Value) -> Option<T>) -> Option<
     entries.collect::<Option<Vec<T>>>()?.try_into().ok()
 }
 
-/// Returns the conditions on the lower and the upper face normal to an axis.
-fn conditions(axis: Option<&Value>) -> [String; 2] {
-    let kind = |value: &Value| {
-        let name = value.as_str().or_else(|| value.get("kind")?.as_str());
-        let moving = if value.get("velocity").is_some() { " (moving)" } else { "" };
-        format!("{}{moving}", name.unwrap_or("?"))
-    };
+/// Returns the entries of the lower and the upper face normal to an axis.
+fn sides(axis: Option<&Value>) -> [Option<&Value>; 2] {
     match axis {
-        Some(Value::Array(pair)) if pair.len() == 2 => [kind(&pair[0]), kind(&pair[1])],
-        Some(both) => [kind(both), kind(both)],
-        None => ["?".to_owned(), "?".to_owned()],
+        Some(Value::Array(pair)) if pair.len() == 2 => [Some(&pair[0]), Some(&pair[1])],
+        both => [both; 2],
     }
+}
+
+/// Returns the kind of condition on a face.
+fn kind(face: &Value) -> Option<&str> {
+    face.as_str().or_else(|| face.get("kind")?.as_str())
+}
+
+/// Returns the condition on a face in words.
+fn condition(face: Option<&Value>) -> String {
+    let kind = face.and_then(kind).unwrap_or("?");
+    let velocity = face.and_then(|face| vector(face, "/velocity"));
+    let moves = kind == "wall" && velocity.is_some_and(|velocity| velocity != DVec3::ZERO);
+    format!("{kind}{}", if moves { " (moving)" } else { "" })
+}
+
+/// Returns the velocity of the inflow through these faces [m/s]; zero without an inflow, `None` if
+/// it differs between them.
+fn inflow(faces: &[Option<&Value>]) -> Option<DVec3> {
+    let inflows = faces.iter().flatten().filter(|face| kind(face) == Some("inflow"));
+    let velocities: Vec<DVec3> =
+        inflows.map(|face| vector(face, "/velocity")).collect::<Option<_>>()?;
+    let first = velocities.first().copied().unwrap_or(DVec3::ZERO);
+    velocities.iter().all(|velocity| *velocity == first).then_some(first)
 }
 
 fn grain_of(grain: &Value) -> GrainFacts {
@@ -233,6 +271,32 @@ mod tests {
         let faces = facts.boundaries.unwrap();
         assert_eq!(faces[1], ["slip", "slip"]);
         assert_eq!(faces[2], ["wall", "wall (moving)"]);
+        assert_eq!(facts.inflow, Some(DVec3::ZERO));
+    }
+
+    #[test]
+    fn a_dry_run_has_no_grid() {
+        let text = "[domain]\nsize = [1, 1, 2]\ncells = [1, 1, 1]\n\
+                    [coupling]\nscheme = 'aperture'\n[run]\nprecision = 'f32'\n";
+        let facts = read(text);
+        assert!(facts.cell().is_none() && facts.scheme.is_none() && !facts.single_precision);
+        let facts = read(&format!("{text}[fluid]\ndensity = 1000\n"));
+        assert!(facts.cell().is_some() && facts.scheme.is_some() && facts.single_precision);
+    }
+
+    #[test]
+    fn an_inflow_is_no_moving_wall() {
+        let with = |z: &str| read(&format!("[domain.boundaries]\nx = 'slip'\nz = {z}\n"));
+        let inflow = "{ kind = 'inflow', velocity = [0, 0.0, 0.1] }";
+        let facts = with(&format!("[{inflow}, 'outflow']"));
+        assert_eq!(facts.boundaries.as_ref().unwrap()[2], ["inflow", "outflow"]);
+        assert!(facts.has_inflow());
+        let speed = facts.relative_speed(DVec3::new(0.03, 0.0, 0.06)).unwrap();
+        assert!((speed - 0.05).abs() < 1e-15, "{speed}");
+        let facts = with(&format!("[{inflow}, {{ kind = 'inflow', velocity = [0, 0, -0.1] }}]"));
+        assert_eq!(facts.relative_speed(DVec3::ZERO), None);
+        let facts = with("{ kind = 'wall', velocity = [0, 0, 0] }");
+        assert_eq!(facts.boundaries.unwrap()[2], ["wall", "wall"]);
     }
 
     #[test]

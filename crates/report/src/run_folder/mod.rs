@@ -176,10 +176,14 @@ impl RunFolder {
 
     /// Returns the last time of any table [s].
     pub fn end(&self) -> f64 {
-        let of_grains = self.grains.iter().filter_map(|h| h.time.last());
         let table = self.diagnostics.as_ref();
-        let of_diagnostics = table.and_then(|table| table.column("time")?.last());
-        let times = of_grains.chain(of_diagnostics).copied();
+        let of_diagnostics = table.and_then(|table| table.column("time")?.last()).copied();
+        of_diagnostics.filter(|t| t.is_finite()).map_or(0.0, |t| t.max(0.0)).max(self.last_row())
+    }
+
+    /// Returns the last time at which a grain is in the box [s].
+    pub fn last_row(&self) -> f64 {
+        let times = self.grains.iter().filter_map(|h| h.time.last()).copied();
         times.filter(|t| t.is_finite()).fold(0.0, f64::max)
     }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use grainwake_formats::FormatError;
+use grainwake_plot::style;
 use grainwake_report::features::RunFeatures;
 use grainwake_report::run_folder::RunFolder;
 use grainwake_report::{ReportError, ReportFiles, render};
@@ -38,6 +39,27 @@ fn picture(file: &Path) -> (u32, f64) {
     let info = reader.next_frame(&mut data).unwrap();
     let inked = data.chunks_exact(3).filter(|p| p.iter().any(|v| *v < 250)).count();
     (info.width, inked as f64 / (info.width * info.height) as f64)
+}
+
+/// Changes the cells of each row of `grains.csv`.
+fn edit_rows(folder: &Path, edit: impl Fn(&mut [String])) {
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let edited = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if cells[0] != "time" {
+            edit(&mut cells);
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&file, table.lines().map(edited).collect::<String>()).unwrap();
+}
+
+/// Replaces a part of a file of a run, which it must hold.
+fn replace(folder: &Path, name: &str, from: &str, to: &str) {
+    let text = std::fs::read_to_string(folder.join(name)).unwrap();
+    assert!(text.contains(from), "{name} lacks {from}: {text}");
+    std::fs::write(folder.join(name), text.replace(from, to)).unwrap();
 }
 
 fn small_pair(swing: f64) -> std::path::PathBuf {
@@ -118,12 +140,24 @@ fn the_upper_grain_leads_a_pair_that_rises() {
     pair::pair(&folder, 0.0, 1e-3);
     let pair = || RunFeatures::of(&RunFolder::open(&folder).unwrap()).pair.unwrap();
     let sinking = pair();
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    // Height on paper of the tilt at the start; y points down.
+    let tilt_at_start = || {
+        let gap = svg(&render(&folder).unwrap(), "gap");
+        let document = roxmltree::Document::parse(&gap).unwrap();
+        let mut nodes = document.descendants();
+        let curve = nodes.find(|node| node.attribute("stroke") == Some(style::GREEN)).unwrap();
+        let start = curve.attribute("d").unwrap().trim_start_matches('M').split('L').next();
+        start.unwrap().split(' ').nth(1).unwrap().parse::<f64>().unwrap()
+    };
+    let in_line = tilt_at_start();
     for name in ["case.resolved.toml", "summary.json"] {
         let text = std::fs::read_to_string(folder.join(name)).unwrap();
         std::fs::write(folder.join(name), text.replace("1500.0", "500.0")).unwrap();
     }
     let [trailing, leading] = pair();
     assert_eq!([leading, trailing], sinking);
+    assert_eq!(tilt_at_start(), in_line, "one behind the other is 0° for both");
     remove(&folder);
 }
 
@@ -337,6 +371,7 @@ fn other_runs_get_their_own_figures() {
         "{seen}"
     );
     assert!(page(&rendered).contains("The grain reached 0.0998 m/s downwards"));
+    assert!(page(&rendered).contains("through the grain: (a) <i>t</i> = 0.325 s; (b) <i>t</i> ="));
     remove(&folder);
 
     let folder = fresh::folder("cavity");
@@ -396,16 +431,11 @@ fn few_grains_are_shown_one_by_one() {
     }
     assert!(page(&rendered).contains("Events are named with the indices of their grains"));
     // A grain that falls out of the box is not claimed to be drawn.
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let out = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" && cells[1] == "7" && cells[0].parse::<f64>().unwrap() > 0.3 {
-            cells[4] = "-0.05";
+    edit_rows(&folder, |cells| {
+        if cells[1] == "7" && cells[0].parse::<f64>().unwrap() > 0.3 {
+            cells[4] = "-0.05".into();
         }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(out).collect::<String>()).unwrap();
+    });
     assert!(page(&render(&folder).unwrap()).contains("Grain 7 has left the box"));
     remove(&folder);
 }
@@ -413,16 +443,7 @@ fn few_grains_are_shown_one_by_one() {
 #[test]
 fn round_off_is_not_a_turn_and_the_summary_knows_all_steps() {
     let folder = small_pair(0.9);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let still = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" {
-            cells[12..15].fill("3e-18");
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[12..15].fill("3e-18".into()));
     let summary = folder.join("summary.json");
     let mut value: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(&summary).unwrap()).unwrap();
@@ -527,16 +548,7 @@ fn grains_are_named_by_number_and_fields_by_precision() {
 #[test]
 fn grains_that_do_not_turn_have_no_angular_speed() {
     let folder = small_pair(0.9);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
-    let still = |line: &str| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        if cells[0] != "time" {
-            cells[12..15].fill("0");
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(still).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[12..15].fill("0".into()));
     let seen = text_of(&svg(&render(&folder).unwrap(), "orientation"));
     assert!(seen.contains("long axis  [°]") && !seen.contains("ω"), "{seen}");
     remove(&folder);
@@ -546,18 +558,174 @@ fn grains_that_do_not_turn_have_no_angular_speed() {
 fn a_grain_that_moves_sideways_shows_its_horizontal_speed() {
     let folder = fresh::folder("single");
     flows::single(&folder);
-    let file = folder.join("grains.csv");
-    let table = std::fs::read_to_string(&file).unwrap();
     // The velocity is turned to x, with round-off along z.
-    let turned = |line: &str| {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        if cells[0] != "time" {
-            cells[5] = std::mem::replace(&mut cells[7], "1e-12".into());
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&file, table.lines().map(turned).collect::<String>()).unwrap();
+    edit_rows(&folder, |cells| cells[5] = std::mem::replace(&mut cells[7], "1e-12".into()));
     let seen = text_of(&svg(&render(&folder).unwrap(), "velocity"));
     assert!(seen.contains("|vh|  [m/s]") && !seen.contains("vz"), "{seen}");
+    remove(&folder);
+}
+
+/// Reverses the vertical velocity before `end` [s]; the rows after it are those of a rebound.
+fn rise(folder: &Path, end: f64) {
+    edit_rows(folder, |cells| {
+        let factor = if cells[0].parse::<f64>().unwrap() < end { -1.0 } else { 0.3 };
+        cells[7] = (factor * cells[7].parse::<f64>().unwrap()).to_string();
+    });
+}
+
+#[test]
+fn the_largest_speed_has_its_direction() {
+    let folder = fresh::folder("single");
+    flows::single(&folder);
+    rise(&folder, 1.29);
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("The grain reached 0.0998 m/s upwards. "), "{said}");
+    replace(&folder, "case.resolved.toml", "gravity = [0, 0, -9.81]\n", "gravity = [0, 0, 0]\n");
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("0.0998 m/s in the direction (0.00, 0.00, 1.00). "), "{said}");
+    assert!(said.contains("Velocity along z; the largest is 0.0998 m/s") && !said.contains("down"));
+    // A speed that is round-off is not reported.
+    edit_rows(&folder, |cells| cells[5..8].fill("3e-11".into()));
+    let said = page(&render(&folder).unwrap());
+    assert!(!said.contains("The grain reached") && !said.contains("Reynolds number at"), "{said}");
+    remove(&folder);
+}
+
+#[test]
+fn the_velocities_of_a_pair_that_rises_are_positive() {
+    let folder = small_pair(0.0);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    let peaks = || {
+        let said = text_of(&svg(&render(&folder).unwrap(), "velocity"));
+        let texts = said.split("at the start reaches ").nth(1).unwrap();
+        texts.split(". (b)").next().unwrap().to_owned()
+    };
+    let settling = peaks();
+    assert_eq!(settling.matches('−').count(), 2, "{settling}");
+    rise(&folder, f64::INFINITY);
+    assert_eq!(peaks(), settling.replace('−', ""));
+    remove(&folder);
+}
+
+#[test]
+fn a_dry_run_has_no_rows_about_the_grid() {
+    let folder = fresh::folder("dry");
+    heap::heap(&folder, 3, false);
+    let rendered = render(&folder).unwrap();
+    let said = page(&rendered);
+    for name in ["cells", "cell edge", "cells per diameter", "coupling", "divergence"] {
+        assert!(!said.contains(&format!("row\">{name}")), "{name}: {said}");
+    }
+    assert!(!said.contains("largest divergence"), "{said}");
+    let seen = text_of(&svg(&rendered, "diagnostics"));
+    assert!(seen.contains("Kinetic energy of the grains.") && !seen.contains("(a)"), "{seen}");
+    remove(&folder);
+}
+
+#[test]
+fn the_reynolds_number_is_relative_to_the_inflow() {
+    let folder = fresh::folder("stream");
+    flows::single(&folder);
+    edit_rows(&folder, |cells| cells[5..8].fill("0".into()));
+    assert!(!page(&render(&folder).unwrap()).contains("Reynolds number at"), "nothing moves");
+    let inflow = "z = [{ kind = \"inflow\", velocity = [0.0, 0.0, 0.02] }, \"outflow\"]";
+    replace(&folder, "case.resolved.toml", "z = [\"wall\", \"free-surface\"]", inflow);
+    let said = page(&render(&folder).unwrap());
+    let name = "Reynolds number at the largest speed relative to the inflow, \
+                |<i>v</i> − <i>U</i>| <i>d</i> / <i>ν</i>";
+    // 0.02 m/s * 0.015 m / (0.058 / 960 m2/s)
+    assert!(said.contains(&format!("{name}</th><td>4.97</td>")), "{said}");
+    assert!(said.contains("inflow below, outflow above"));
+    remove(&folder);
+}
+
+/// Returns the heights of the letters (a), (b) ... in a drawing, and its last frame.
+fn letters_and_frame(svg: &str) -> (Vec<f64>, [f64; 2]) {
+    let document = roxmltree::Document::parse(svg).unwrap();
+    let number = |node: &roxmltree::Node, name: &str| -> f64 {
+        node.attribute(name).unwrap().parse().unwrap()
+    };
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    let letter =
+        |node: &roxmltree::Node| node.text().is_some_and(|t| t.len() == 3 && &t[..1] == "(");
+    let mut letters: Vec<(String, f64)> = texts
+        .filter(letter)
+        .map(|node| (node.text().unwrap().to_owned(), number(&node, "y")))
+        .collect();
+    letters.sort_by(|a, b| a.0.cmp(&b.0));
+    let mut rects = document.descendants().filter(|node| node.has_tag_name("rect"));
+    let frame = rects.rfind(|rect| rect.attribute("fill") == Some("none")).unwrap();
+    let top = number(&frame, "y");
+    let letters = letters.into_iter().map(|(_, y)| y).collect();
+    (letters, [top, top + number(&frame, "height")])
+}
+
+#[test]
+fn a_pair_is_observed_until_a_grain_leaves_the_box() {
+    let folder = small_pair(0.0);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    // Grain 1 leaves through the floor at 0.2 s, grain 0 at 0.3 s.
+    let file = folder.join("grains.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let inside = |line: &&str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let end = if cells[1] == "1" { 0.2 } else { 0.3 };
+        cells[0].parse::<f64>().map_or(true, |time| time <= end)
+    };
+    let kept: Vec<&str> = table.lines().filter(inside).collect();
+    std::fs::write(&file, kept.join("\n") + "\n").unwrap();
+    edit_rows(&folder, |cells| {
+        let time: f64 = cells[0].parse().unwrap();
+        cells[4] = (0.05 - 0.3 * time).to_string();
+    });
+    let left = |grain: usize, time: f64| {
+        format!(
+            "{{\"time\":{time},\"event\":\"left\",\"grains\":[{grain}],\"confirmed\":{time}}}\n"
+        )
+    };
+    std::fs::write(folder.join("events.jsonl"), left(1, 0.2) + &left(0, 0.3)).unwrap();
+    let summary = folder.join("summary.json");
+    let text = std::fs::read_to_string(&summary).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    value.as_object_mut().unwrap().remove("tumble_time_s");
+    std::fs::write(&summary, value.to_string()).unwrap();
+    let rendered = render(&folder).unwrap();
+    let said = page(&rendered);
+    assert!(said.contains("aria-label=\"Phases: drafting from 0 s to 0.200 s\""), "{said}");
+    assert!(said.contains("when grain 1 leaves the box. (b)"), "{said}");
+    assert!(said.contains("The letters are at the height of grain 0."), "{said}");
+    let (letters, [top, bottom]) = letters_and_frame(&svg(&rendered, "trajectories"));
+    assert!(letters.len() >= 2 && letters.is_sorted(), "{letters:?}");
+    // The middle of a letter is 2.4 pt above its baseline.
+    let inside = |y: &f64| (top..=bottom).contains(&(y - 2.4));
+    assert!(letters.iter().all(inside), "{letters:?} {top} {bottom}");
+    remove(&folder);
+}
+
+#[test]
+fn letters_follow_a_grain_through_a_periodic_box() {
+    let folder = fresh::folder("periodic");
+    heap::heap(&folder, 3, false);
+    let faces = "cells = [20, 20, 50]\n[domain.boundaries]\nx = \"wall\"\ny = \"wall\"\n\
+                 z = \"periodic\"\n";
+    replace(&folder, "case.resolved.toml", "cells = [20, 20, 50]\n", faces);
+    // All grains fall by 60 mm in a box of 100 mm: only grain 0 stays clear of the periodic side.
+    edit_rows(&folder, |cells| {
+        let (time, grain): (f64, f64) = (cells[0].parse().unwrap(), cells[1].parse().unwrap());
+        cells[4] = (0.09 - 0.1 * time - 0.03 * grain).to_string();
+    });
+    let in_order = || {
+        let (letters, _) = letters_and_frame(&svg(&render(&folder).unwrap(), "trajectories"));
+        assert!(letters.len() == 4 && letters.is_sorted(), "{letters:?}");
+    };
+    in_order();
+    // Grain 0 rests at a height that changes by round-off only.
+    edit_rows(&folder, |cells| {
+        let time: f64 = cells[0].parse().unwrap();
+        if cells[1] == "0" {
+            cells[4] = (0.05 + 1e-9 * time).to_string();
+        }
+    });
+    in_order();
     remove(&folder);
 }

@@ -15,6 +15,16 @@ fn durations_and_times_read_well() {
 }
 
 #[test]
+fn a_power_of_ten_in_the_provenance_is_a_superscript() {
+    let passes = serde_json::json!([{"name": "ghosts_{x}", "wall_s": 4.61e-4}]);
+    let value = serde_json::json!({"sessions": [{"passes": passes, "command": ["a^{2}"]}]});
+    let run = RunFolder { provenance: Some(value), ..RunFolder::default() };
+    let html = provenance(&run).into_string();
+    assert!(html.contains("<code>ghosts_{x} 4.61×10<sup>−4</sup> s</code>"), "{html}");
+    assert!(html.contains("<code>a^{2}</code>"), "text of files is no markup: {html}");
+}
+
+#[test]
 fn provenance_cannot_bring_markup_in() {
     let value = serde_json::json!({"command": ["grainwake", "run", "<script>"], "commit": null, "sessions": [{"threads": 2}]});
     let run = RunFolder { provenance: Some(value), ..RunFolder::default() };
