@@ -5,11 +5,6 @@ use numpy::ndarray::{Array1, Array2};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-/// Returns a number of grains in words.
-pub fn counted(grains: usize) -> String {
-    format!("{grains} grain{}", if grains == 1 { "" } else { "s" })
-}
-
 /// Returns vectors as an array of the shape (n, 3).
 pub fn vectors<'py>(
     py: Python<'py>,

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use grainwake_run::case::{Case, schema};
+use grainwake_run::number_format::number_of_grains;
 use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 
 use crate::arguments::Whole;
-use crate::arrays::{counted, json};
+use crate::arrays::json;
 use crate::case_dict::{override_list, to_toml};
 use crate::error::{IntoException, Raise, input, system};
 use crate::grain::PyGrain;
@@ -375,7 +376,7 @@ impl PyCase {
     }
     fn __repr__(&self) -> String {
         let [nx, ny, nz] = self.case.setup.mesh.cells;
-        let grains = counted(self.case.setup.grains.len());
+        let grains = number_of_grains(self.case.setup.grains.len());
         format!("Case({:?}, {grains}, {nx} x {ny} x {nz} cells)", self.case.title)
     }
 }

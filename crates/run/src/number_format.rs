@@ -57,6 +57,11 @@ pub fn size(bytes: u64) -> String {
     format!("{value:.digits$} {unit}")
 }
 
+/// Formats a number of grains: "1 grain", "3 grains".
+pub fn number_of_grains(count: usize) -> String {
+    format!("{count} grain{}", if count == 1 { "" } else { "s" })
+}
+
 fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }

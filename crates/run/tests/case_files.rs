@@ -311,6 +311,13 @@ fn boundaries_must_belong_together() {
         "domain.boundaries.x",
         &["no velocity"],
     );
+    let count = |faces: &str| {
+        let boundaries = format!("cell_size = \"0.25 mm\"\nboundaries = {{ {faces} }}");
+        problems(&PAIR.replace("cell_size = \"0.25 mm\"", &boundaries)).len()
+    };
+    let slip = "{ kind = \"slip\", velocity = [0, 0.1, 0] }";
+    assert_eq!(count(&format!("x = {slip}")), 1, "one value for both sides");
+    assert_eq!(count(&format!("x = [{slip}, {slip}]")), 2, "a value for each side");
     let lid = PAIR.replace("cell_size = \"0.25 mm\"", "cell_size = \"0.25 mm\"\nboundaries = { x = \"periodic\", z = [\"wall\", { kind = \"wall\", velocity = [\"1 cm/s\", 0, 0] }] }");
     let case = good(&lid);
     assert_eq!(case.setup.boundaries.0[0], [Boundary::Periodic; 2]);
@@ -997,7 +1004,25 @@ fn contact_that_dominates_names_its_levers() {
 fn expectations_need_a_meaning() {
     let with = |text: &str| PAIR.replace("[time]", &format!("[expect]\n{text}\n[time]"));
     assert_eq!(good(&with("kiss_time = { value = \"0.2 s\", tolerance = \"5 %\" }\npeak_settling_speed = [{ at_least = 0.1, grain = 0 }, { at_most = 0.2, grain = 1 }]")).expect.len(), 3);
-    assert!(problems(&with("kiss_time = { value = 0.2 }"))[0].message.contains("what is expected"));
+    refused(
+        "[time]",
+        "[expect]\nkiss_time = { value = 0.2 }\n[time]",
+        "expect.kiss_time",
+        &["what is expected"],
+    );
+    // A result of a pair in the case of a single grain.
+    let single = |line: &str| {
+        let grain = PAIR.rfind("[[grain]]").unwrap();
+        let text = format!("{}[expect]\n{line}\n", &PAIR[..grain]);
+        let found = problems(&text);
+        let [problem] = &found[..] else { panic!("{found:?}") };
+        assert!(problem.message.ends_with("but the case has 1 grain"), "{problem}");
+        let key = format!("expect.{}", line.split(' ').next().unwrap());
+        assert!(problem.key.as_ref().unwrap().starts_with(&key), "{problem}");
+        assert_eq!(problem.place().unwrap().1, text.lines().count(), "{problem}");
+    };
+    single("kiss_time = { at_least = 0.1 }");
+    single("separation_time = [{ at_most = 0.1 }]");
     assert!(
         problems(&with("kiss_tme = { value = 0.2 }"))[0]
             .help

@@ -206,7 +206,7 @@ fn what_a_checkpoint_fixes_may_not_differ() {
                  density = 2500\nposition = [1e-3, 1e-3, 10e-3]\n";
     std::fs::write(&case, text.clone() + third).unwrap();
     let refused = message(&run(&case, &child, &["--from", &parent_name]).code(2));
-    assert!(refused.contains("3 grains, and 2 in the parent run"), "{refused}");
+    assert!(refused.contains("3 grains, and the parent run has 2 grains"), "{refused}");
     assert!(refused.contains("case.toml:"), "{refused}");
     std::fs::write(&case, text).unwrap();
     // The end of the case is that of the parent's newest checkpoint.

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use grainwake_run::case::quantity::{AngularVelocity, Force, Kind, Torque, Velocity};
+use grainwake_run::number_format::number_of_grains;
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::MotionComponent;
@@ -10,7 +11,6 @@ use pyo3::prelude::*;
 
 use super::PySimulation;
 use crate::arguments::vector;
-use crate::arrays::counted;
 use crate::error::{Raise, input};
 
 fn optional<K: Kind>(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<DVec3>> {
@@ -38,7 +38,7 @@ impl PySimulation {
     fn index(&self, grain: i64) -> PyResult<usize> {
         let count = self.sim.grains().len();
         usize::try_from(grain).ok().filter(|grain| *grain < count).ok_or_else(|| {
-            let has = counted(count);
+            let has = number_of_grains(count);
             PyIndexError::new_err(format!(
                 "there is no grain {grain}: the simulation has {has}, counted from 0"
             ))

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use grainwake_formats::summary::EndReason;
 use grainwake_run::case::quantity::Time;
+use grainwake_run::number_format::number_of_grains;
 use grainwake_run::{Recording, Watch, admit_memory};
 use grainwake_solver::sim::{SAME_TIME, Simulation};
 use pyo3::exceptions::PyBufferError;
@@ -20,7 +21,6 @@ use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::arguments::{Whole, quantity};
-use crate::arrays::counted;
 use crate::case::PyCase;
 use crate::error::{Raise, input, numerics};
 use crate::threads;
@@ -375,7 +375,7 @@ impl PySimulation {
     }
     fn __repr__(&self) -> String {
         let (time, steps) = (self.sim.time(), self.sim.steps());
-        let grains = counted(self.sim.grains().len());
+        let grains = number_of_grains(self.sim.grains().len());
         format!("Simulation({grains}, t = {time:.6} s, step {steps})")
     }
 }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::error::{CaseError, Problem};
 use super::quantity::{Time, parse_quantity};
 use super::{Case, Source};
-use crate::number_format::{quantity, vector};
+use crate::number_format::{number_of_grains, quantity, vector};
 use crate::{Parent, RESOLVED, RunError};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 
@@ -135,8 +135,8 @@ impl Differences<'_> {
 
     fn of_grains(&mut self, now: &[Grain], before: &[Grain]) {
         if now.len() != before.len() {
-            let message =
-                format!("there are {} grains, and {} in the parent run", now.len(), before.len());
+            let [now, before] = [now, before].map(|grains| number_of_grains(grains.len()));
+            let message = format!("the case has {now}, and the parent run has {before}");
             return self.report(&["packing", "grain", "domain"], message, AS_BEFORE);
         }
         let pairs = || now.iter().zip(before).enumerate();

@@ -207,13 +207,23 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
         .parse()
         .map_err(|_| format!("\"{text}\" does not start with a number; write {}", K::EXPECTED))?;
     let unit = trimmed[end..].trim();
+    if unit.strip_prefix(',').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+        return Err(format!(
+            "\"{text}\" has a comma in its number, and the decimal separator is a point; write {}",
+            K::EXPECTED
+        ));
+    }
     if unit.is_empty() {
         return without_unit::<K>(value);
     }
     let scale = parse_unit(unit).map_err(|error| match error {
         UnitError::Unknown(symbol) => {
             let symbols = known_symbols();
-            let near = || nearest(&symbol, symbols.iter().map(String::as_str)).map(str::to_string);
+            let fits = |candidate: &&str| {
+                has_dimension(&unit.replacen(&symbol, candidate, 1), K::DIMENSION)
+            };
+            let symbols = symbols.iter().map(String::as_str).filter(fits);
+            let near = || nearest(&symbol, symbols).map(str::to_string);
             let hint = parted(unit, &symbol, K::DIMENSION)
                 .or_else(near)
                 .map_or(String::new(), |s| format!(" (did you mean `{s}`?)"));
@@ -245,7 +255,12 @@ fn parted(unit: &str, symbol: &str, dimension: Dimension) -> Option<String> {
             let (first, second) = symbol.split_at(cut);
             unit.replacen(symbol, &format!("{first}{between}{second}"), 1)
         })
-        .find(|parted| parse_unit(parted).is_ok_and(|scale| scale.dimension == dimension))
+        .find(|parted| has_dimension(parted, dimension))
+}
+
+/// Whether a unit is known and has this dimension.
+fn has_dimension(unit: &str, dimension: Dimension) -> bool {
+    parse_unit(unit).is_ok_and(|scale| scale.dimension == dimension)
 }
 
 /// Length of the leading number of `text`, in bytes.
@@ -315,12 +330,25 @@ mod tests {
         assert!(message.contains("did you mean `mm`"), "{message}");
         let message = parse_quantity::<KinematicViscosity>("1 mPa s").unwrap_err();
         assert!(message.contains("dynamic viscosity") && message.contains("1 cSt"), "{message}");
-        for (text, wanted) in [("1 mPas", "`mPa s`"), ("1 mPaS", "`mPa`")] {
-            let message = parse_quantity::<DynamicViscosity>(text).unwrap_err();
+        let message = parse_quantity::<DynamicViscosity>("1 mPas").unwrap_err();
+        assert!(message.contains("did you mean `mPa s`?"), "{message}");
+        for (text, wanted) in [("2 kgm3", "`kg/m3`"), ("2 kgg/m3", "`kg`")] {
+            let message = parse_quantity::<Density>(text).unwrap_err();
             assert!(message.contains(&format!("did you mean {wanted}?")), "{message}");
         }
-        let message = parse_quantity::<Density>("2 kgm3").unwrap_err();
-        assert!(message.contains("did you mean `kg/m3`?"), "{message}");
+        // Only units of the expected dimension are suggested.
+        for refused in [
+            parse_quantity::<Length>("0.02 in"),
+            parse_quantity::<Density>("1.5 g/cc"),
+            parse_quantity::<DynamicViscosity>("1 mPaS"),
+        ] {
+            let message = refused.unwrap_err();
+            assert!(message.contains("unknown unit") && !message.contains("did you"), "{message}");
+        }
+        for text in ["0,5 mm", "-1,5e-3", "1,000.5 m"] {
+            let message = parse_quantity::<Length>(text).unwrap_err();
+            assert!(message.contains("the decimal separator is a point"), "{message}");
+        }
         assert!(parse_quantity::<Number>("45 deg").is_err());
         assert!(parse_quantity::<Length>("mm").is_err());
     }

@@ -36,19 +36,19 @@ pub fn differing(folder: &Path, resolved: &str) -> String {
     let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();
     keys.sort();
     keys.dedup();
-    let side = |table: &BTreeMap<String, String>, key: &String| {
+    let side = |table: &BTreeMap<String, Value>, key: &String| {
         table.get(key).map_or("not given".to_owned(), |value| {
-            if value.chars().count() <= MAX_VALUE {
-                value.clone()
-            } else {
-                "another value".to_owned()
-            }
+            let text = value.to_string();
+            if text.chars().count() <= MAX_VALUE { text } else { "another value".to_owned() }
         })
+    };
+    let equal = |key: &String| {
+        there.get(key).zip(here.get(key)).is_some_and(|(there, here)| is_equal(there, here))
     };
     let differ: Vec<String> = keys
         .into_iter()
         .filter(|key| !IGNORED.iter().any(|free| key.starts_with(free)))
-        .filter(|key| there.get(*key) != here.get(*key))
+        .filter(|key| !equal(key))
         .map(|key| format!("{key}: {} there, {} here", side(&there, key), side(&here, key)))
         .collect();
     match differ.len() {
@@ -63,9 +63,21 @@ pub fn differing(folder: &Path, resolved: &str) -> String {
     }
 }
 
+/// Returns whether two values are equal; 2500 and 2500.0 are.
+fn is_equal(there: &Value, here: &Value) -> bool {
+    match (there, here) {
+        (Value::Integer(whole), Value::Float(number))
+        | (Value::Float(number), Value::Integer(whole)) => *whole as f64 == *number,
+        (Value::Array(there), Value::Array(here)) => {
+            there.len() == here.len() && there.iter().zip(here).all(|(a, b)| is_equal(a, b))
+        }
+        _ => there == here,
+    }
+}
+
 /// Returns the dotted keys with their values.
-fn flatten(table: toml::Table) -> BTreeMap<String, String> {
-    fn walk(key: String, value: Value, out: &mut BTreeMap<String, String>) {
+fn flatten(table: toml::Table) -> BTreeMap<String, Value> {
+    fn walk(key: String, value: Value, out: &mut BTreeMap<String, Value>) {
         let inner = |name: &str| format!("{key}.{name}");
         match value {
             Value::Table(table) => {
@@ -79,7 +91,7 @@ fn flatten(table: toml::Table) -> BTreeMap<String, String> {
                 }
             }
             plain => {
-                out.insert(key, plain.to_string());
+                out.insert(key, plain);
             }
         }
     }
@@ -102,6 +114,16 @@ mod tests {
         std::fs::write(folder.join(RESOLVED), there).unwrap();
         let same = there.replace("end = 1.0", "end = 2.0").replace("\"a\"", "\"b\"");
         assert!(differing(&folder, &same).contains("grain file"));
+        let whole = same.replace("2500.0", "2500").replace("[fluid]", "[fluid]\ng = [0, 0, -9.0]");
+        let listed = there.replace("[fluid]", "[fluid]\ng = [0.0, 0, -9]");
+        std::fs::write(folder.join(RESOLVED), listed).unwrap();
+        assert!(differing(&folder, &whole).contains("was edited"), "equal numbers");
+        let other = whole.replace("2500", "2501").replace("-9.0", "-8");
+        assert_eq!(
+            differing(&folder, &other),
+            "fluid.g: [0.0, 0, -9] there, [0, 0, -8] here; grain.0.density: 2500.0 there, 2501 here"
+        );
+        std::fs::write(folder.join(RESOLVED), there).unwrap();
         let other = same.replace("0.001", "0.005").replace("\"sphere\"", "\"cube\"");
         assert_eq!(
             differing(&folder, &other),

@@ -4,6 +4,7 @@ use super::{TriangleMesh, polygon};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 use tobj::LoadError;
@@ -12,7 +13,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
-    let mut text = Cursor::new(bytes);
+    let mut text = Cursor::new(joined(&bytes));
     let (models, _) = tobj::load_obj_buf(&mut text, &options, no_materials)
         .map_err(|error| ShapeError::malformed(path, described(error, &text)))?;
     let mut mesh = TriangleMesh::default();
@@ -37,8 +38,31 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     Ok(mesh)
 }
 
+/// Joins lines that a backslash continues. As many empty lines follow a joined line as it had
+/// continuations, so that the lines after it keep their numbers. Comments are not continued.
+fn joined(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if !bytes.contains(&b'\\') {
+        return bytes.into();
+    }
+    let mut text = Vec::with_capacity(bytes.len());
+    let mut continuations = 0;
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+        let is_comment = continuations == 0 && line.trim_ascii_start().starts_with(b"#");
+        let continued = line.trim_ascii_end().strip_suffix(b"\\").filter(|_| !is_comment);
+        if let Some(start) = continued {
+            text.extend_from_slice(start);
+            text.push(b' ');
+            continuations += 1;
+        } else {
+            text.extend_from_slice(line);
+            text.extend(std::iter::repeat_n(b'\n', std::mem::take(&mut continuations)));
+        }
+    }
+    text.into()
+}
+
 /// Describes an error that ended the reading of `text`, with its line if that is known.
-fn described(error: LoadError, text: &Cursor<Vec<u8>>) -> String {
+fn described(error: LoadError, text: &Cursor<Cow<[u8]>>) -> String {
     let what = match error {
         LoadError::ReadError => "the file is not text in UTF-8",
         LoadError::PositionParseError => "expected three numbers after \"v\"",

@@ -4,12 +4,12 @@ use super::{TriangleMesh, polygon};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
-use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
     ScalarType,
 };
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 
 /// Properties read from a vertex or a face; others are skipped.
@@ -59,13 +59,22 @@ impl PropertyAccess for Element {
 }
 
 pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<TriangleMesh> {
-    let malformed = |e: ply_rs_bw::parser::ParseError| ShapeError::malformed(path, e);
+    if !bytes.starts_with(b"ply") {
+        return Err(ShapeError::malformed(path, "the first line is not \"ply\""));
+    }
     let size = bytes.len() as u64;
     let mut reader = Reader::new(Cursor::new(bytes));
     let parser = Parser::<Element>::new();
-    let header = parser.read_header(&mut reader).map_err(malformed)?;
+    let header = parser.read_header(&mut reader);
+    let header = header.map_err(|error| {
+        ShapeError::malformed(path, of_header(&error, reader.get_ref().get_ref()))
+    })?;
     check_header(path, &header, size, limits)?;
-    let payload = parser.read_payload(&mut reader, &header).map_err(malformed)?;
+    let payload = parser.read_payload(&mut reader, &header);
+    let payload = payload.map_err(|error| {
+        let reason = of_elements(&error, reader.get_ref().get_ref(), &header);
+        ShapeError::malformed(path, reason)
+    })?;
     let elements = |name: &str| payload.get(name).map_or(&[][..], Vec::as_slice);
     let vertices = elements("vertex").iter().map(|e| e.position).collect();
     let mut mesh = TriangleMesh { vertices, triangles: Vec::new() };
@@ -81,6 +90,43 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
         return Err(too_many_elements(path, "more faces", limits));
     }
     Ok(mesh)
+}
+
+/// Describes an error in the header.
+fn of_header(error: &ParseError, bytes: &[u8]) -> String {
+    match error.line() {
+        _ if error.kind() == ErrorKind::UnexpectedEof => {
+            "the line \"end_header\" is missing".into()
+        }
+        Some(line) => format!("line {line} of the header cannot be read: {}", quoted(bytes, line)),
+        None => "the header is not text, or lacks a line such as \"format ascii 1.0\"".into(),
+    }
+}
+
+/// Describes an error in the elements.
+fn of_elements(error: &ParseError, bytes: &[u8], header: &Header) -> String {
+    if error.kind() == ErrorKind::UnexpectedEof {
+        let count = |element: &ElementDef| format!("{} ({})", element.name, element.count);
+        let counts: Vec<String> = header.elements.values().map(count).collect();
+        return format!(
+            "the file ends before the last element of its header: {}",
+            counts.join(", ")
+        );
+    }
+    // The parser counts the elements of a binary file as lines.
+    match error.line().filter(|_| matches!(header.encoding, Encoding::Ascii)) {
+        Some(line) => {
+            let text = quoted(bytes, line);
+            format!("line {line} does not hold the numbers that the header declares: {text}")
+        }
+        None => "the elements are not those that the header declares".into(),
+    }
+}
+
+/// Quotes the start of a line, counted from 1.
+fn quoted(bytes: &[u8], line: usize) -> String {
+    let line = bytes.split(|byte| *byte == b'\n').nth(line.saturating_sub(1)).unwrap_or_default();
+    format!("{:?}", String::from_utf8_lossy(line).trim().chars().take(60).collect::<String>())
 }
 
 /// Checks that the header declares vertices and faces, and no more than the file can hold.

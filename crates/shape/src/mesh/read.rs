@@ -6,6 +6,9 @@ use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
+/// Mark with which some editors begin text in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Reads STL, OBJ, PLY or spherical-harmonic coefficients (.anm), merges coincident vertices and
 /// checks that the surface is closed and consistently oriented. `unit` is the length [m] of the
 /// file's unit: 1e-3 for millimetres. Errors report positions in the file's own units.
@@ -25,8 +28,20 @@ pub fn read_mesh(
             return Err(ShapeError::unsupported(path, reason));
         }
     };
-    let (bytes, source) = read_bytes(path, limits)?;
-    Ok((closed(&reader(path, bytes, limits)?, unit)?, source))
+    let (mut bytes, source) = read_bytes(path, limits)?;
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
+    let raw = reader(path, bytes, limits)?;
+    if raw.triangles.is_empty() {
+        return Err(ShapeError::malformed(path, "the file has no faces"));
+    }
+    match closed(&raw, unit) {
+        Err(ShapeError::BadMesh { defect }) => {
+            Err(ShapeError::bad_mesh(format!("{}: {defect}", path.display())))
+        }
+        mesh => Ok((mesh?, source)),
+    }
 }
 
 /// Merges coincident vertices of a mesh in memory and checks it as [`read_mesh`] does. `unit` is

@@ -4,7 +4,7 @@ use super::TriangleMesh;
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, too_many_elements};
 use glam::DVec3;
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 
 /// Size of the header of a binary file [bytes].
@@ -18,9 +18,13 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         let needed = HEADER as u64 + TRIANGLE as u64 * u64::from(count);
         let size = bytes.len() as u64;
         if needed != size && text.is_none() {
+            let hint = match is_named_solid(&bytes) {
+                true => "",
+                false => "; a text file begins with the word solid",
+            };
             let reason = format!(
                 "the header counts {count} triangles, which take {needed} bytes, but the file has \
-                 {size}; a text file begins with the word solid"
+                 {size}{hint}"
             );
             return Err(ShapeError::malformed(path, reason));
         }
@@ -35,11 +39,19 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         return Err(ShapeError::malformed(path, "too short for an STL file"));
     }
     let mut cursor = Cursor::new(bytes);
-    let triangles =
-        stl_io::create_stl_reader(&mut cursor).map_err(|e| ShapeError::malformed(path, e))?;
     let mut mesh = TriangleMesh::default();
+    let damaged = |error: std::io::Error, facets: usize| {
+        let reason = match error.kind() {
+            ErrorKind::UnexpectedEof => {
+                format!("the file ends after {facets} facets, without endsolid")
+            }
+            _ => format!("facet {}: {error}", facets + 1),
+        };
+        ShapeError::malformed(path, reason)
+    };
+    let triangles = stl_io::create_stl_reader(&mut cursor).map_err(|error| damaged(error, 0))?;
     for triangle in triangles {
-        let triangle = triangle.map_err(|e| ShapeError::malformed(path, e))?;
+        let triangle = triangle.map_err(|error| damaged(error, mesh.triangles.len()))?;
         if mesh.triangles.len() as u64 >= limits.mesh_elements {
             return Err(too_many_elements(path, "more faces", limits));
         }
@@ -51,11 +63,20 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
     Ok(mesh)
 }
 
-/// Returns a text file in the form that `stl_io` reads: lower case, and no byte-order mark, blanks
-/// or name before the facets. `None` for other files.
+/// Returns whether a file begins with the word "solid", as text files and many binary ones do.
+fn is_named_solid(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
+/// Returns a text file in the form that `stl_io` reads: lower case, and no blanks or name before
+/// the facets. `None` for other files. The highest byte of the number of triangles is zero in
+/// binary files; text has no such byte.
 fn text(bytes: &[u8]) -> Option<Vec<u8>> {
-    let body = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let name = body.get(5..).filter(|_| body[..5].eq_ignore_ascii_case(b"solid"))?;
+    let is_binary = bytes.get(..HEADER).is_some_and(|header| header.contains(&0));
+    if is_binary || !is_named_solid(bytes) {
+        return None;
+    }
+    let name = &bytes.trim_ascii_start()[5..];
     let facets = name.iter().position(|b| *b == b'\n').unwrap_or(name.len());
     Some([b"solid ", &name[facets..].to_ascii_lowercase()[..]].concat())
 }
@@ -74,7 +95,6 @@ mod tests {
         for variant in [
             format!(" \t{text}"),
             format!("\n{text}"),
-            format!("\u{feff}{text}"),
             text.to_ascii_uppercase(),
             text.replace("solid a b", "solid"),
             text.replace('\n', "\r\n"),

@@ -289,9 +289,116 @@ fn errors_of_obj_files_have_their_line() {
         let message = folder.refusal("a.obj", text.as_bytes());
         assert!(message.contains(expected), "{message}");
     }
+    // Continued lines keep their numbers.
+    let continued = vertices.replace("v 1 0 0", "v 1 \\\n 0 \\\r\n 0");
+    let message = folder.refusal("a.obj", format!("{continued}{faces}f 1 2 9\n").as_bytes());
+    assert!(message.contains("line 12: vertex 9 does not exist; the file has 4"), "{message}");
+    let message = folder.refusal("a.obj", format!("{continued}v 1 x\n{faces}").as_bytes());
+    assert!(message.contains("line 8: expected three numbers"), "{message}");
+    let message = folder.refusal("a.obj", format!("{vertices}f 1 2 \\\nx\n{faces}").as_bytes());
+    assert!(message.contains("line 6: expected the numbers of vertices"), "{message}");
     let not_text = [vertices.as_bytes(), b"v 0 \xff 0\n"].concat();
     let message = folder.refusal("a.obj", &not_text);
     assert!(message.contains("line 6: the file is not text"), "{message}");
+}
+
+#[test]
+fn text_files_may_begin_with_a_byte_order_mark() {
+    let folder = Folder::new();
+    let mesh = ball(4, DVec3::ZERO);
+    let files = [("a.stl", ascii_stl(&mesh)), ("a.obj", obj(&mesh)), ("a.ply", ply(&mesh, true))];
+    for (name, plain) in files {
+        let read = folder.read(name, &plain).unwrap();
+        let marked = [b"\xef\xbb\xbf", &plain[..]].concat();
+        assert_eq!(folder.read(name, &marked).unwrap().vertices, read.vertices, "{name}");
+    }
+    let coefficients = b"\xef\xbb\xbf0 0 3.5 0\n";
+    folder.read("a.anm", coefficients).unwrap();
+}
+
+#[test]
+fn a_backslash_continues_a_line_of_an_obj_file() {
+    let folder = Folder::new();
+    let plain = String::from_utf8(obj(&ball(4, DVec3::ZERO))).unwrap();
+    let read = folder.read("a.obj", plain.as_bytes()).unwrap();
+    for continuation in [" \\\n", " \\\r\n\t", "\\\n "] {
+        let text = plain.replace(' ', continuation);
+        let text = format!("# made in C:\\meshes\\\n{text}");
+        let mesh = folder.read("a.obj", text.as_bytes()).unwrap();
+        assert_eq!(
+            (mesh.vertices, mesh.triangles),
+            (read.vertices.clone(), read.triangles.clone())
+        );
+    }
+}
+
+/// Messages name the file and the defect in the terms of the format, not of a parser.
+#[test]
+fn errors_of_damaged_files_are_in_terms_of_their_format() {
+    let folder = Folder::new();
+    let mesh = ball(4, DVec3::ZERO);
+    let (binary, text) = (ply(&mesh, false), String::from_utf8(ply(&mesh, true)).unwrap());
+    let mut solid = stl(&mesh);
+    solid[5..80].fill(b' ');
+    let (counted, size) = (mesh.triangles.len(), solid.len());
+    folder.read("solid.stl", &solid).unwrap();
+    let facets = ascii_stl(&mesh);
+    let cut = facets.windows(6).rposition(|word| word == b"vertex").unwrap();
+    let facet = String::from_utf8(facets.clone()).unwrap().replacen("endloop", "endlop", 1);
+    let bytes = |text: String| text.into_bytes();
+    let vertices = mesh.vertices.len();
+    for (name, file, expected) in [
+        ("a.ply", facets.clone(), "the first line is not \"ply\"".to_owned()),
+        ("a.ply", Vec::new(), "the first line is not \"ply\"".to_owned()),
+        (
+            "a.ply",
+            bytes(text.replacen("element vertex", "elment vertex", 1)),
+            format!("line 3 of the header cannot be read: \"elment vertex {vertices}\""),
+        ),
+        (
+            "a.ply",
+            bytes(text.replacen("end_header", "comment", 1)),
+            "line 11 of the header cannot be read".to_owned(),
+        ),
+        ("a.ply", b"ply\nformat ascii 1.0\n".to_vec(), "\"end_header\" is missing".to_owned()),
+        ("a.ply", b"ply\nend_header\n".to_vec(), "lacks a line such as \"format".to_owned()),
+        (
+            "a.ply",
+            bytes(text.replacen("end_header\n0", "end_header\nx", 1)),
+            "line 11 does not hold the numbers that the header declares: \"x".to_owned(),
+        ),
+        (
+            "a.ply",
+            binary[..binary.len() - 3].to_vec(),
+            format!("ends before the last element of its header: vertex ({vertices}), face"),
+        ),
+        (
+            "a.stl",
+            solid[..size - 60].to_vec(),
+            format!(
+                "the header counts {counted} triangles, which take {size} bytes, but the file \
+                 has {}",
+                size - 60
+            ),
+        ),
+        (
+            "a.stl",
+            facets[..cut].to_vec(),
+            format!("the file ends after {} facets, without endsolid", counted - 1),
+        ),
+        ("a.stl", bytes(facet), "facet 1: expected [\"endloop\"]".to_owned()),
+        ("a.obj", Vec::new(), "the file has no faces".to_owned()),
+        ("a.obj", bytes(text.clone()), "the file has no faces".to_owned()),
+        ("a.stl", b"solid a\nendsolid a\n".to_vec(), "the file has no faces".to_owned()),
+    ] {
+        let message = folder.refusal(name, &file);
+        let is_clear = message.contains(name) && message.contains(&expected);
+        assert!(is_clear && !message.contains('\n'), "`{expected}` is missing in:\n{message}");
+    }
+    let mut open = mesh.clone();
+    open.triangles.pop();
+    let message = folder.refusal("open.ply", &ply(&open, true));
+    assert!(message.contains("open.ply: the mesh is open"), "{message}");
 }
 
 #[test]

@@ -68,8 +68,9 @@ impl Content<'_> {
             (settling::lead(self.records))
             @if finished > 0 && self.has_pairs() { (pairs::lead(self.records)) }
             @if !self.findings.is_empty() {
-                ". Of " (self.findings.len()) " claims, " (verdicts(Verdict::Holds)) " hold, "
-                (verdicts(Verdict::Contradicted)) " are contradicted and " (verdicts(Verdict::Open)) " are open"
+                ". Claims that hold: " (verdicts(Verdict::Holds))
+                ", contradicted: " (verdicts(Verdict::Contradicted))
+                ", open: " (verdicts(Verdict::Open))
             }
             "."
             @if self.has_settling() || self.has_pairs() {

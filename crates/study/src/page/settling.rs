@@ -1,5 +1,6 @@
 //! Parts of the report page about runs other than pairs.
 
+use grainwake_run::number_format::number_of_grains;
 use maud::{Markup, html};
 
 use super::{Content, paragraph};
@@ -53,7 +54,7 @@ pub(super) fn lead(records: &[RunRecord]) -> String {
     let speeds = speeds.map(|range| format!("; final settling speeds {range} m/s"));
     let reynolds = range(|s| s.final_reynolds).map(|range| format!(", Reynolds numbers {range}"));
     let parts = [speeds, reynolds].map(Option::unwrap_or_default).concat();
-    format!("; {landed} of {grains} grains landed{parts}")
+    format!("; {landed} of {} landed{parts}", number_of_grains(grains))
 }
 
 /// Returns the runs in order of a value: the first five and the last three.

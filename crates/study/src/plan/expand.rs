@@ -96,7 +96,9 @@ pub(crate) fn expand(
             Err(problem) => problems.found.push(problem),
         }
     }
-    problems.check_unique(raw, &models);
+    if problems.found.is_empty() {
+        problems.check_unique(raw, &models);
+    }
     if problems.found.is_empty() { Ok(models) } else { Err(problems.found) }
 }
 
@@ -147,7 +149,13 @@ impl Problems<'_> {
             let help = "values = [{ name = \"a\", value = ... }, ...]";
             self.add(message, help, axis.values.span.as_ref(), "empty");
         }
+        let mut seen = BTreeSet::new();
         for value in &axis.values.value {
+            if !seen.insert(&value.name.value) {
+                let message = format!("there are two values called \"{}\"", value.name.value);
+                let help = "give every value of an axis a unique name";
+                self.add(message, help, value.name.span.as_ref(), "again");
+            }
             self.check_name(&value.name);
             self.check_factors(&value.factors);
             match (&value.value, &axis.key) {
@@ -238,15 +246,16 @@ impl Problems<'_> {
         let Some(model) = models.iter().find(|model| !seen.insert(&model.name)) else {
             return;
         };
-        let values = raw.axis.iter().flat_map(|a| &a.values.value);
-        let names = values.map(|v| &v.name).chain(raw.model.iter().map(|m| &m.name));
-        let part_of = |name: &&Located<String>| {
-            model.name == name.value || model.name.split('-').any(|part| part == name.value)
-        };
-        let span = names.rev().find(part_of).and_then(|name| name.span.clone());
+        let own = raw.model.iter().map(|own| &own.name).rfind(|name| name.value == model.name);
+        // Names of values may contain the "-" that joins them.
+        let level = raw.axis.last().and_then(|axis| {
+            let level = model.levels.get(&axis.name.value)?;
+            axis.values.value.iter().map(|value| &value.name).find(|name| name.value == *level)
+        });
+        let name = own.or(level);
         let message = format!("there are two models called \"{}\"", model.name);
         let help = "give every value of an axis and every model a unique name";
-        self.add(message, help, span.as_ref(), "again");
+        self.add(message, help, name.and_then(|name| name.span.as_ref()), "again");
     }
 }
 

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DQuat, DVec3};
 use grainwake_run::case::Case;
+use grainwake_run::number_format::number_of_grains;
 
 use super::expand::Model;
 use super::file::{Ensemble, Study};
@@ -28,18 +29,17 @@ pub(crate) fn member_overrides(
         Err(study.source.problem(message, help, ensemble.span.as_ref(), "this ensemble").into())
     };
     let Some(grain) = grains.get(index) else {
-        let (name, count) = (&model.name, grains.len());
-        let message =
-            format!("the ensemble moves grain {index}, but \"{name}\" has {count} grains");
+        let (name, count) = (&model.name, number_of_grains(grains.len()));
+        let message = format!("the ensemble moves grain {index}, but \"{name}\" has {count}");
         return refuse(message, "grains are numbered from 0");
     };
     let given = placed_grains(case);
     if index >= given {
         let message = format!(
             "the ensemble moves grain {index}, but \"{}\" gives a position of their own to \
-             {given} of {} grains",
+             {given} of {}",
             model.name,
-            grains.len()
+            number_of_grains(grains.len())
         );
         return refuse(message, "list the grain as [[grain]], or choose such a grain by `grain`");
     }
@@ -59,9 +59,9 @@ pub(crate) fn member_overrides(
         if given != grains.len() {
             let message = format!(
                 "cell_shift moves grains with a position of their own, but \"{}\" has {given} of \
-                 {} grains",
+                 {}",
                 model.name,
-                grains.len()
+                number_of_grains(grains.len())
             );
             return refuse(message, "list the grains as [[grain]], or leave out cell_shift");
         }

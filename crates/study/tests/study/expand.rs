@@ -194,8 +194,19 @@ fn problems_are_located() {
     let (message, _, place) = one(&STUDY.replace("case.toml", "cases.toml"));
     assert!(message.contains("no case file"), "{message}");
     assert_eq!(place, Some((true, 3)));
-    let (message, ..) = one(&STUDY.replace("\"heavy\"", "\"light\"").replace("heavy-*", "light-*"));
-    assert!(message.contains("two models called \"light-smooth\""), "{message}");
+    // The second of two equal names is the one to change, on any axis and among the models.
+    let (message, _, place) =
+        one(&STUDY.replace("\"heavy\"", "\"light\"").replace("heavy-*", "light-*"));
+    assert_eq!(message, "axis.0.values.1.name: there are two values called \"light\"");
+    assert_eq!(place, Some((true, 9)));
+    let (message, _, place) = one(&STUDY.replace("\"alone\"", "\"light-rough\""));
+    assert_eq!(message, "model.0.name: there are two models called \"light-rough\"");
+    assert_eq!(place, Some((true, 18)));
+    let joined = STUDY.replace("\"heavy\"", "\"light-rough\"").replace("heavy-*", "light-*");
+    let joined = joined.replace("\"smooth\"", "\"rough-rough\"");
+    let (message, _, place) = one(&joined);
+    assert!(message.contains("two models called \"light-rough-rough\""), "{message}");
+    assert_eq!(place, Some((true, 15)));
     let (message, help, _) = one(&STUDY.replace("heavy-*", "haevy-rough"));
     assert!(
         message.contains("no model is called") && help.contains("heavy-rough"),
@@ -235,6 +246,12 @@ fn members_are_located_in_the_ensemble_and_share_no_folder_with_a_model() {
     assert!(one(&format!("{STUDY}{far}")).contains("of \"light-smooth\""));
     let none = ensemble.replace("[ensemble]", "[ensemble]\ngrain = 5");
     assert!(one(&format!("{STUDY}{none}")).contains("moves grain 5"));
+    let single = "[[model]]\nname = \"single\"\nset.grain = [{ shape = { kind = \"sphere\", \
+                  diameter = \"2 mm\" }, density = 2500, position = [\"5 mm\", \"5 mm\", \
+                  \"9 mm\"] }]\n";
+    let second = ensemble.replace("[ensemble]", "[ensemble]\ngrain = 1");
+    let message = one(&format!("{STUDY}{single}{second}"));
+    assert!(message.contains("moves grain 1, but \"single\" has 1 grain"), "{message}");
     let packed = STUDY.replace(
         "set = { \"grain.1.velocity\" = [0, 0, 0] }",
         "set = { packing = [{ shapes = [{ kind = \"sphere\", diameter = \"1 mm\" }], density = 2500, count = 1, region = { lower = [0, 0, \"20 mm\"], upper = [\"4 mm\", \"4 mm\", \"24 mm\"] } }] }",

@@ -140,6 +140,25 @@ fn single_grains_have_results_figures_and_text() {
     assert!(!before.is_empty());
 }
 
+#[test]
+fn factors_that_are_no_shapes_are_not_called_so() {
+    let (folder, out, _) = carried_out(1);
+    let analysis = "[[claim]]\nsays = \"Gravity pulls\"\nquantity = \"final_speed_m_per_s\"\n\
+                    test.trend = { with = \"g\", sign = \"rises\" }\n[correlations]\n\
+                    quantities = [\"final_speed_m_per_s\"]\nfactors = [\"g\"]\nby = \"gravity\"\n";
+    std::fs::write(folder.path().join("analysis.toml"), analysis).unwrap();
+    let with = STUDY.replace("[[axis]]", "analysis = \"analysis.toml\"\n[[axis]]");
+    std::fs::write(folder.path().join("study.toml"), &with).unwrap();
+    render(&out).unwrap();
+    let text = page(&out);
+    for words in ["Results against factors", "contradicted: 0, open: 1"] {
+        assert!(text.contains(words), "`{words}` is missing in {text}");
+    }
+    for words in ["shape factors", "kissing", "A pair", "1 claims", "1 grains"] {
+        assert!(!text.contains(words), "{words}: {text}");
+    }
+}
+
 fn rows_of(out: &Path) -> usize {
     let text = std::fs::read_to_string(out.join("table.json")).unwrap();
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();

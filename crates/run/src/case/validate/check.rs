@@ -42,6 +42,11 @@ impl<'a> Checker<'a> {
         self.problems.push(Problem::new(message).key(key).help(help));
     }
 
+    /// Returns the position of the value of `key`; none if the file does not give it.
+    pub fn span_of(&self, key: &str) -> Span {
+        self.source.value_of(key).cloned()
+    }
+
     /// Returns the dotted key of the value at `span`; empty for a default.
     pub fn key(&self, span: &Span) -> &str {
         let key = span.as_ref().and_then(|span| self.source.key_at(span));

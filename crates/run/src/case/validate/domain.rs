@@ -217,10 +217,18 @@ pub(super) fn boundaries(
     let axes = [&raw.boundaries.x, &raw.boundaries.y, &raw.boundaries.z];
     let mut result = Boundaries([[Boundary::WALL; 2]; 3]);
     for (axis, faces) in axes.into_iter().enumerate() {
+        let mut refused = None;
         for (side, face) in [&faces.lower, &faces.upper].into_iter().enumerate() {
             match boundary(face, axis, side) {
                 Ok(boundary) => result.0[axis][side] = boundary,
-                Err((message, help)) => check.fail(spans[axis][side], message, help),
+                Err((message, help)) => {
+                    // One value may give the condition on both sides.
+                    let refusal = Some((spans[axis][side], message.clone()));
+                    if refused != refusal {
+                        check.fail(spans[axis][side], message, help);
+                    }
+                    refused = refusal;
+                }
             }
         }
         check_axis(check, faces, axis, mesh.cells[axis], dry);

@@ -5,6 +5,7 @@ use crate::case::expect::{Expectation, Measure};
 use crate::case::located::{Located, Span};
 use crate::case::quantity::Kind;
 use crate::case::raw::{OneOrMany, RawExpect, RawExpected, Tolerance};
+use crate::number_format::number_of_grains;
 
 /// Returns all expectations of a case with this number of grains.
 pub(super) fn expectations(
@@ -31,10 +32,16 @@ fn expected<K: Kind>(
     measure: Measure,
     grains: usize,
 ) -> Vec<Expectation> {
-    let key = format!("expect.{measure}");
-    if !raw.0.is_empty() && measure.of_pair() && grains != 2 {
-        let message = format!("this is a result of a pair, but there are {grains} grains");
-        check.fail(&raw.0[0].span, message, "leave it out, or use two grains");
+    // A single table has no position of its own.
+    let whole = check.span_of(&format!("expect.{measure}"));
+    if let [first, ..] = &raw.0[..]
+        && measure.of_pair()
+        && grains != 2
+    {
+        let count = number_of_grains(grains);
+        let message = format!("this is a result of a pair, but the case has {count}");
+        let span = first.span.as_ref().or(whole.as_ref()).cloned();
+        check.fail(&span, message, "leave it out, or use two grains");
     }
     let mut all = Vec::new();
     for item in &raw.0 {
@@ -46,8 +53,9 @@ fn expected<K: Kind>(
                 low,
                 high,
             }),
-            Err((span, message, help)) if span.is_some() => check.fail(span, message, help),
-            Err((_, message, help)) => check.fail_key(&key, message, help),
+            Err((span, message, help)) => {
+                check.fail(if span.is_some() { span } else { &whole }, message, help);
+            }
         }
     }
     all

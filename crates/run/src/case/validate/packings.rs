@@ -12,7 +12,7 @@ use crate::case::raw::{
     Arrangement, Bounds, MotionLaw, Orientation, PackingOrientation, Position, RawGrain, RawPacking,
 };
 use crate::case::sphere_cells::Sphere;
-use crate::number_format::vector;
+use crate::number_format::{number_of_grains, vector};
 use grainwake_solver::dem::{Enclosure, Grain};
 use rand::{RngExt, SeedableRng};
 
@@ -84,7 +84,8 @@ fn lattice(
 ) -> Result<Vec<DVec3>, (String, &'static str)> {
     let radii: Vec<f64> = grains.iter().map(|grain| grain.shape.bounding_radius()).collect();
     let centres = region.lattice(&radii, jitter, vertical, random).map_err(|sites| {
-        let message = format!("the lattice has {sites} sites for {} grains", grains.len());
+        let count = number_of_grains(grains.len());
+        let message = format!("the lattice has {sites} sites for {count}");
         let help = "take fewer or smaller grains, a larger region, or less clearance; arrangement = \"random\" may hold more grains that are not round";
         (message, help)
     })?;

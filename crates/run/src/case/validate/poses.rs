@@ -13,7 +13,7 @@ use crate::case::located::{Located, Span};
 use crate::case::quantity::{Quantity, Triple};
 use crate::case::raw::{MotionLaw, Orientation, Position, RawCase, RawGrain, RawPoses, Turns};
 use crate::case::source::Source;
-use crate::number_format::quantity;
+use crate::number_format::{number_of_grains, quantity};
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_formats::poses::{Pose, Poses, read};
 use grainwake_formats::{grains as grains_table, summary};
@@ -127,17 +127,16 @@ fn of_run<'a>(
     if !finished && raw.time.is_none() && table.rows_before.is_some_and(|n| n > table.poses.len()) {
         let time = quantity(table.time.unwrap_or(0.0), "s");
         let message = format!(
-            "the rows at {time} are incomplete: the run has not finished, and {} of {} grains are there",
+            "the rows at {time} are incomplete: the run has not finished, and they give {} of {}",
             table.poses.len(),
-            table.rows_before.unwrap_or(0)
+            number_of_grains(table.rows_before.unwrap_or(0))
         );
         return check.refuse(&run.span, message, "continue the run, or give an earlier `time`");
     }
     let grain_of = move |check: &mut Checker, pose: &Pose| {
         let Some(grain) = case.grain.get(pose.grain) else {
-            let count = case.grain.len();
-            let message =
-                format!("{} has grain {}, but its run has {count}", grains_table::FILE, pose.grain);
+            let (file, count) = (grains_table::FILE, number_of_grains(case.grain.len()));
+            let message = format!("{file} has grain {}, but its run has {count}", pose.grain);
             return check.refuse(&run.span, message, "the folder is damaged: run its case again");
         };
         let mut grain = moved(&grain.value, &run.span);

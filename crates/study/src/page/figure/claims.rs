@@ -28,8 +28,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let panels = kinds.map(|kind| -> Vec<Row> {
         known.iter().filter(|f| f.effect == kind).filter_map(|f| Row::new(f)).collect()
     });
-    let count: usize = panels.iter().map(Vec::len).sum();
-    if count == 0 {
+    if panels.iter().all(Vec::is_empty) {
         return None;
     }
     let entry = |verdict: Verdict| Entry {
@@ -52,12 +51,10 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         panel(&mut drawing, kind, rows, top)?;
         top += of_panel(rows);
     }
-    let caption = format!(
-        "Estimated effect and 95 % interval of {count} claims; one that reaches the edge of a panel \
-         may have no bound. Shaded: effects that do not matter, where the analysis states them. \
-         The rule of the verdicts is given above the table of \
-         claims."
-    );
+    let caption = "Estimated effects of the claims with their 95 % intervals; an interval that \
+                   reaches the edge of a panel may have no bound. Shaded: effects that do not \
+                   matter, where the analysis states them. The rule of the verdicts is given above \
+                   the table of claims.";
     Some(Figure::new("claims", "Claims with their effects", caption, drawing))
 }
 

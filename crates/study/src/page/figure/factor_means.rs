@@ -87,10 +87,15 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             frame.outline(&mut drawing, Labelled { across, up: n == 0 });
         }
     }
-    let caption = "Mean over the models with equal or similar values of a factor; bars: \
-                   95 % intervals of a bootstrap over models and members. A pair that lands \
-                   before the event counts in the kissing share only.";
-    Some(Figure::new("factor-means", "Results against shape factors", caption, drawing))
+    let left_out = match quantities.iter().any(|quantity| quantity == KISSING_SHARE) {
+        true => "A pair that lands before the event counts in the kissing share only.",
+        false => "A run that ends before the event of a quantity is left out.",
+    };
+    let caption = format!(
+        "Mean over the models with equal or similar values of a factor; bars: 95 % intervals of a \
+         bootstrap over models and members. {left_out}"
+    );
+    Some(Figure::new("factor-means", "Results against factors", caption, drawing))
 }
 
 /// Horizontal axis of the panels of a factor.

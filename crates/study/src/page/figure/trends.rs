@@ -90,11 +90,11 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         }
     }
     let caption = format!(
-        "Spearman's rank correlation of each quantity with each factor, over up to {n} grains in \
-         one orientation, with 95 % intervals. An interval that excludes zero indicates a trend."
+        "Spearman's rank correlation of each quantity with each factor, over up to {n} models of \
+         equal {}, with 95 % intervals. An interval that excludes zero indicates a trend.",
+        text::literal(&title(&request.by))
     );
-    let title = "Rank correlations with shape factors";
-    Some(Figure::new("correlations", title, caption, drawing))
+    Some(Figure::new("correlations", "Rank correlations with factors", caption, drawing))
 }
 
 /// Width of each of `across` panels in a row [pt].
