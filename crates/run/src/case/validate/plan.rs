@@ -7,7 +7,7 @@ use crate::case::located::Located;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawProbe, RawRun, RawStop, RawTime};
 use crate::case::settling::{default_max_step, floor, settled_time_step};
-use crate::number_format::quantity;
+use crate::number_format::{number_of_grains, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
 use grainwake_solver::grid::Mesh;
@@ -167,8 +167,8 @@ fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop
         let message = format!("a hold of {}", quantity(raw.hold.si, "s"));
         check.fail(&raw.hold.span, message, "give zero or a positive time");
     } else if raw.when == StopWhen::Separation && grains.len() != 2 {
-        let count = grains.len();
-        let message = format!("separation is an event of a pair, but there are {count} grains");
+        let count = number_of_grains(grains.len());
+        let message = format!("separation is an event of a pair, but the case has {count}");
         let help = "use stop = \"landing\" or \"rest\", or two grains";
         check.fail(&raw.span, message, help);
     } else if grains.iter().all(|grain| grain.translation != MotionConstraint::Free) {
@@ -211,7 +211,8 @@ fn plane(
         (None, Some(grain)) => {
             if grain.value >= grains {
                 let message = format!("there is no grain {}", grain.value);
-                let help = format!("there are {grains} grains, counted from 0");
+                let count = number_of_grains(grains);
+                let help = format!("the case has {count}, counted from 0");
                 check.fail(&grain.span, message, help);
             }
             PlanePosition::Grain(grain.value)

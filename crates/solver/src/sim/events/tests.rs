@@ -47,7 +47,7 @@ fn follow(path: &[(f64, f64, f64)]) -> Tracker {
 #[test]
 fn without_gravity_there_is_no_vertical_and_no_tumble() {
     let pair = [grain(0.0, 0.0), grain(1.2, 0.0)];
-    for (gravity, expected) in [(DVec3::ZERO, None), (DVec3::NEG_Z, Some(0.2))] {
+    for (gravity, expected) in [(DVec3::ZERO, None), (DVec3::NEG_Z, Some(0.3))] {
         let params = EventParams::for_grains(&pair, gravity, 0.0, open_box(false));
         let mut tracker = Tracker::new(params, &pair, Some(0.2));
         for (time, x) in [(0.1, 1.1), (0.2, 0.999), (0.3, 1.1)] {
