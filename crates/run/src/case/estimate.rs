@@ -205,8 +205,8 @@ fn start_reynolds(setup: &Setup) -> Option<f64> {
 const RESOLVED_DRAG_ERROR: f64 = 0.02;
 
 /// Relative error of the drag with `n` cells per diameter at a Reynolds number, where the boundary
-/// layer is not resolved. It bounds the errors at 8, 12 and 16 cells in `docs/accuracy.md`: 8.3,
-/// 5.1 and 1.7 % at Re 350.
+/// layer is not resolved. It bounds the errors at 8, 12 and 16 cells in `docs/accuracy.md`: 7.6,
+/// 4.6 and 1.2 % at Re 350.
 pub(super) fn thin_layer_drag_error(n: f64, reynolds: f64) -> f64 {
     0.0048 * reynolds / n.powf(1.4)
 }
@@ -278,12 +278,12 @@ mod tests {
             (100.0, 24.0, 0.001),
             (100.0, 32.0, 0.001),
             (150.0, 8.0, 0.005),
-            (300.0, 8.0, 0.057),
-            (350.0, 8.0, 0.0833),
-            (300.0, 12.0, 0.0357),
-            (350.0, 12.0, 0.0513),
-            (300.0, 16.0, 0.012),
-            (350.0, 16.0, 0.017),
+            (300.0, 8.0, 0.0464),
+            (350.0, 8.0, 0.0756),
+            (300.0, 12.0, 0.0276),
+            (350.0, 12.0, 0.0456),
+            (300.0, 16.0, 0.0056),
+            (350.0, 16.0, 0.0121),
         ];
         for (reynolds, n, error) in measured {
             let expected = drag_error(n, reynolds);
