@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use grainwake_formats::events::Event;
+pub use grainwake_run::number_format::count;
 use grainwake_run::{Ending, Job, Observer, Options, Progress, RunError};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -107,11 +108,6 @@ fn per_second(rate: f64) -> String {
     } else {
         format!("{:.1} s/step", 1.0 / rate.max(1e-9))
     }
-}
-
-/// Formats a count with its noun: "1 grain", "2 grains".
-pub fn count(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
 /// Returns the first line of a message.

@@ -50,7 +50,7 @@ pub struct RunFeatures {
     pub kind: RunKind,
     /// Scales; `None` without diameter or gravity.
     pub scales: Option<Scales>,
-    /// Whether gravity is known and not zero.
+    /// True if gravity is known and not zero.
     pub has_gravity: bool,
     /// Unit vector against gravity; +z if gravity is unknown or zero.
     pub up: DVec3,

@@ -57,9 +57,14 @@ pub fn size(bytes: u64) -> String {
     format!("{value:.digits$} {unit}")
 }
 
+/// Formats a count with its noun: "1 grain", "2 grains".
+pub fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
 /// Formats a number of grains: "1 grain", "3 grains".
-pub fn number_of_grains(count: usize) -> String {
-    format!("{count} grain{}", if count == 1 { "" } else { "s" })
+pub fn number_of_grains(number: usize) -> String {
+    count(number, "grain")
 }
 
 fn six_digits(value: f64) -> f64 {

@@ -1332,6 +1332,8 @@ fn default_outputs_hardly_shorten_the_steps() {
         assert!(whole(plan.slices / plan.tables) && plan.surfaces == plan.slices, "{end}");
         let plan = case(end, "tables = \"3 ms\"").job().plan;
         assert!(whole(plan.slices / 3e-3), "{end}: {}", plan.slices);
+        let plan = case(end, "tables = 0").job().plan;
+        assert!(plan.slices > 0.79 * free.min(plan.end), "{end}: {}", plan.slices);
     }
     let plan = case("10", "").job().plan;
     assert_eq!((plan.tables, plan.slices), (0.025, 0.25));

@@ -258,7 +258,7 @@ fn parted(unit: &str, symbol: &str, dimension: Dimension) -> Option<String> {
         .find(|parted| has_dimension(parted, dimension))
 }
 
-/// Whether a unit is known and has this dimension.
+/// Returns whether `unit` can be read and has the given dimension.
 fn has_dimension(unit: &str, dimension: Dimension) -> bool {
     parse_unit(unit).is_ok_and(|scale| scale.dimension == dimension)
 }

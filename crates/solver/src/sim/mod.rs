@@ -92,7 +92,7 @@ impl StepData {
         // With fluid the equations of the grains contain the damping (`Start::prepare`).
         let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
         let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
-        let at_rest =
+        let at_start =
             |grain: &Grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() };
         StepData {
             dynamics: ContactDynamics::new(contact, setup.enclosure()),
@@ -100,7 +100,7 @@ impl StepData {
             times: PassTimes::default(),
             momentum_residual: DVec3::ZERO,
             loads: vec![Load::default(); count],
-            previous: grains.iter().map(at_rest).collect(),
+            previous: grains.iter().map(at_start).collect(),
             kinematics: grains.iter().map(RigidState::of).collect(),
             external: vec![Load::default(); count],
             applied: vec![Load::default(); count],

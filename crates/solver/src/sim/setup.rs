@@ -282,9 +282,7 @@ impl Setup {
         }
         Ok(())
     }
-}
 
-impl Setup {
     /// Index of the first free grain that is too light for the coupling.
     fn too_light_grain(&self) -> Option<usize> {
         let least = LIGHTEST_FREE_GRAIN * self.fluid?.density;

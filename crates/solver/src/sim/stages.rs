@@ -82,13 +82,9 @@ impl<'a> Start<'a> {
             if setup.fluid.is_some() && setup.contact.global_damping > 0.0 {
                 data.applied[i] += damping_load(grain, setup.contact.global_damping, dt);
             }
-        }
-        if fluid.is_some() {
-            for (i, grain) in setup.grains.iter().enumerate() {
-                let previous = &mut data.previous[i];
-                previous.set_change = grain.rigid_velocity() - previous.velocity;
-                data.kinematics[i] = RigidState { pose: grain.pose, velocity: previous.velocity };
-            }
+            let previous = &mut data.previous[i];
+            previous.set_change = grain.rigid_velocity() - previous.velocity;
+            data.kinematics[i] = RigidState { pose: grain.pose, velocity: previous.velocity };
         }
         let time = clock.time;
         // Midpoint rule: the sub-steps take the prescribed velocities at the middle of the step.

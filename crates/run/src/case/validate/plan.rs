@@ -107,8 +107,9 @@ pub(super) fn plan(
     let by_limits = matches!(setup.step, StepRule::Limits { .. }) && !dry;
     let smallest_step = if by_limits { SMALLEST_STEP * settled } else { 0.0 };
     let step = if by_limits { EXPECTED_STEP * settled } else { settled };
-    let tables = interval(&mut raw.tables, default_tables(end, step.min(end)));
-    let coarse = multiple_of(tables, (end / 40.0).max(tables));
+    let step = step.min(end);
+    let tables = interval(&mut raw.tables, default_tables(end, step));
+    let coarse = multiple_of(tables, (end / 40.0).max(step));
     let slices = interval(&mut raw.slices, if dry { 0.0 } else { coarse });
     let surfaces = if slices > 0.0 { slices } else { coarse };
     let surfaces = interval(&mut raw.surfaces, surfaces);
