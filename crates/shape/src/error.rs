@@ -100,9 +100,11 @@ pub enum ShapeError {
         defect: String,
     },
     /// All normals point inwards.
-    #[error("the mesh is inside out (its volume is {volume:.6e})")]
+    #[error("{}the mesh is inside out (its volume is {volume:.6e})", prefix(file))]
     InsideOut {
-        /// Signed volume, in file units cubed.
+        /// Name of the file; empty for a mesh in memory.
+        file: String,
+        /// Signed volume, in units of the mesh cubed.
         volume: f64,
     },
     /// The finished shape failed the quality check.
@@ -137,6 +139,18 @@ impl ShapeError {
         let reason = reason.to_owned();
         ShapeError::BadParameter { name, value, reason }
     }
+    /// Names the `file` of a refused mesh; an empty name stands for a mesh in memory.
+    pub(crate) fn in_file(self, file: &str) -> ShapeError {
+        match self {
+            ShapeError::BadMesh { defect } => {
+                ShapeError::bad_mesh(format!("{}{defect}", prefix(file)))
+            }
+            ShapeError::InsideOut { volume, .. } => {
+                ShapeError::InsideOut { file: file.to_owned(), volume }
+            }
+            other => other,
+        }
+    }
     pub(crate) fn bad_mesh(defect: impl Into<String>) -> ShapeError {
         let defect = defect.into();
         ShapeError::BadMesh { defect }
@@ -145,6 +159,11 @@ impl ShapeError {
         let reason = reason.into();
         ShapeError::Quality { defect, reason }
     }
+}
+
+/// Beginning of a message about a `file`; nothing for a mesh in memory.
+fn prefix(file: &str) -> String {
+    if file.is_empty() { String::new() } else { format!("{file}: ") }
 }
 
 /// Defect of a shape that failed the quality check.

@@ -233,3 +233,33 @@ fn a_very_short_step_is_forgotten() {
     let ratio = speed(&disturbed) / speed(&undisturbed);
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
 }
+
+/// The fluid does not yet have the velocity that was set, so its CFL number does not limit the next
+/// step.
+#[test]
+fn the_step_after_a_set_velocity_or_load_keeps_the_cfl_number() {
+    let limits = StepRule::Limits { cfl: 0.4, viscous: 0.2, max_step: f64::INFINITY };
+    // A load goes on to accelerate the grain, which each step notices one step late.
+    let controls: [(&str, f64, fn(&mut Simulation)); 4] = [
+        ("set", 0.45, |sim| sim.set_velocity(0, TRANSLATION, DVec3::new(0.2, 0.0, 0.2)).unwrap()),
+        ("prescribed", 0.45, |sim| sim.prescribe_velocity(0, TRANSLATION, DVec3::X * 0.3).unwrap()),
+        ("turned", 0.45, |sim| sim.prescribe_velocity(0, ROTATION, DVec3::Z * 300.0).unwrap()),
+        ("loaded", 0.9, |sim| {
+            let force = DVec3::new(5e-4, 0.0, 0.0);
+            sim.set_external_load(0, Load { force, torque: DVec3::ZERO }).unwrap();
+        }),
+    ];
+    for (name, largest, control) in controls {
+        let mut setup = setup().with_step(limits);
+        setup.gravity = DVec3::ZERO;
+        let mut sim = Simulation::new(setup).unwrap();
+        advance(&mut sim, 1);
+        let at_rest = sim.time_step();
+        control(&mut sim);
+        for _ in 0..3 {
+            advance(&mut sim, 1);
+            assert!(sim.cfl() < largest, "{name}: {}", sim.cfl());
+        }
+        assert!(sim.time_step() < 0.5 * at_rest, "{name}: {} after {at_rest}", sim.time_step());
+    }
+}

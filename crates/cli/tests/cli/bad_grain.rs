@@ -134,7 +134,7 @@ fn a_mesh_with_a_face_without_area() {
 fn a_mesh_inside_out() {
     let mut faces = cube();
     faces.iter_mut().for_each(|f| f.swap(1, 2));
-    refused_mesh(&faces, "1 mm", &["inside out", "--flip"]);
+    refused_mesh(&faces, "1 mm", &["body.stl: the mesh is inside out", "--flip"]);
 }
 
 #[test]
@@ -143,7 +143,8 @@ fn a_mesh_through_itself() {
     // One corner is pulled through the opposite side.
     let moved = faces.iter_mut().flatten().filter(|p| **p == [1.0, 1.0, 1.0]);
     moved.for_each(|p| *p = [0.3, 0.4, -0.5]);
-    refused_mesh(&faces, "1 mm", &["cross near (", "pairs cross", "repair the mesh"]);
+    let words = ["body.stl: ", "cross near (", "pairs cross", "repair the mesh"];
+    refused_mesh(&faces, "1 mm", &words);
 }
 
 #[test]

@@ -38,9 +38,9 @@ pub fn shape_from_mesh(
             turned = copy;
             &turned
         }
-        Err(error) => return Err(error),
+        Err(error) => return Err(error.in_file(&source.name)),
     };
-    closed.check_crossings()?;
+    closed.check_crossings().map_err(|error| error.in_file(&source.name))?;
     from_closed(closed, Surface::Exact, provenance, &options.shape)
 }
 

@@ -36,12 +36,8 @@ pub fn read_mesh(
     if raw.triangles.is_empty() {
         return Err(ShapeError::malformed(path, "the file has no faces"));
     }
-    match closed(&raw, unit) {
-        Err(ShapeError::BadMesh { defect }) => {
-            Err(ShapeError::bad_mesh(format!("{}: {defect}", path.display())))
-        }
-        mesh => Ok((mesh?, source)),
-    }
+    let mesh = closed(&raw, unit).map_err(|error| error.in_file(&path.to_string_lossy()))?;
+    Ok((mesh, source))
 }
 
 /// Merges coincident vertices of a mesh in memory and checks it as [`read_mesh`] does. `unit` is

@@ -24,7 +24,7 @@ impl TriangleMesh {
         self.check_one_piece(&neighbours)?;
         let volume = self.signed_volume();
         if volume <= 0.0 {
-            return Err(ShapeError::InsideOut { volume });
+            return Err(ShapeError::InsideOut { file: String::new(), volume });
         }
         Ok(neighbours)
     }

@@ -16,9 +16,9 @@ pub(super) struct Clock {
     rule: StepRule,
     /// nu * sum 1/h_a^2 over the resolved axes [1/s]; zero without fluid.
     viscous_rate: f64,
-    /// Longest first step [s]: from rest, gravity or the body acceleration moves nothing by more
-    /// than `cfl` cells in it.
-    first_step: f64,
+    /// Longest next step [s]: from rest, gravity, the body acceleration or a load that was set
+    /// moves nothing by more than `cfl` cells in it.
+    pub longest_next: f64,
 }
 
 /// Largest ratio of successive steps within limits, since Adams-Bashforth extrapolates over the
@@ -37,9 +37,8 @@ impl Clock {
     /// Clock at t = 0.
     pub fn new(setup: &Setup) -> Clock {
         let spacing = setup.finest_spacing();
-        let resolved = || setup.mesh.resolved_axes().map(|axis| spacing[axis]);
-        let inverse_squares: f64 = resolved().map(|h| h.powi(-2)).sum();
-        let smallest = resolved().fold(f64::INFINITY, f64::min);
+        let resolved = setup.mesh.resolved_axes().map(|axis| spacing[axis]);
+        let inverse_squares: f64 = resolved.map(|h| h.powi(-2)).sum();
         let fluid_density = setup.fluid.map_or(0.0, |fluid| fluid.density);
         let acceleration = setup
             .grains
@@ -48,12 +47,6 @@ impl Clock {
             .chain(setup.fluid.map(|fluid| fluid.body_acceleration.length()))
             .chain(setup.prescription.body_acceleration(0.0).map(DVec3::length))
             .fold(0.0, f64::max);
-        let first_step = match setup.step {
-            StepRule::Limits { cfl, .. } if acceleration > 0.0 => {
-                (cfl * smallest / acceleration).sqrt()
-            }
-            _ => f64::INFINITY,
-        };
         Clock {
             time: 0.0,
             steps: 0,
@@ -62,7 +55,7 @@ impl Clock {
             viscous_rate: setup
                 .fluid
                 .map_or(0.0, |fluid| fluid.kinematic_viscosity * inverse_squares),
-            first_step,
+            longest_next: setup.longest_step_from_rest(acceleration),
         }
     }
 
@@ -73,9 +66,9 @@ impl Clock {
             StepRule::Fixed(step) if self.steps == 0 => (step, step),
             StepRule::Fixed(step) => (step, step.min(MAX_RATIO * self.last_step)),
             StepRule::Limits { cfl, viscous, max_step } => {
-                let largest = (cfl / rate).min(viscous / self.viscous_rate).min(max_step);
-                let next =
-                    if self.steps == 0 { self.first_step } else { MAX_GROWTH * self.last_step };
+                let limits = [viscous / self.viscous_rate, max_step, self.longest_next];
+                let largest = limits.into_iter().fold(cfl / rate, f64::min);
+                let next = if self.steps == 0 { largest } else { MAX_GROWTH * self.last_step };
                 (largest, next.min(largest))
             }
         };
@@ -102,6 +95,7 @@ impl Clock {
         self.time += if ends { horizon } else { step };
         self.steps += 1;
         self.last_step = step;
+        self.longest_next = f64::INFINITY;
     }
 }
 
@@ -125,7 +119,7 @@ mod tests {
                 max_step: f64::INFINITY,
             },
             viscous_rate: 1.0,
-            first_step: last,
+            longest_next: last,
         };
         let mut steps = Vec::new();
         while clock.time < 1.0 - 1e-9 {

@@ -9,6 +9,10 @@ use super::Simulation;
 use crate::dem::{Grain, MotionConstraint};
 use crate::math::Load;
 
+/// Largest sum of |u_a| next to a sphere set in motion at once, over that of the sphere: 1.6 with 8
+/// cells across.
+const FLUID_BESIDE: f64 = 1.6;
+
 /// Reason why a grain cannot be controlled.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum ControlError {
@@ -140,15 +144,40 @@ impl Simulation {
 
     /// Sets the external load on a grain, which acts in every step until it is replaced: force [N]
     /// and torque about the centroid [N m], space frame. Weight, buoyancy, contact and fluid act
-    /// besides.
+    /// besides. In a fluid the next step is so short that the change of the load moves the surface
+    /// of the grain by at most the CFL number.
     ///
     /// # Errors
     /// [`ControlError`] for a grain that is unknown or has left, or a load that is not finite.
     pub fn set_external_load(&mut self, grain: usize, load: Load) -> Result<(), ControlError> {
         let finite = load.force.is_finite() && load.torque.is_finite();
         self.check_control(grain, finite, "external load")?;
-        self.data.external[grain] = load;
+        let change = load + std::mem::replace(&mut self.data.external[grain], load) * -1.0;
+        let grain = &self.setup.grains[grain];
+        let lever_arm = grain.shape.bounding_radius() / grain.principal_inertia().min_element();
+        let acceleration =
+            change.force.length() / grain.mass() + lever_arm * change.torque.length();
+        let longest = self.setup.longest_step_from_rest(acceleration);
+        self.clock.longest_next = self.clock.longest_next.min(longest);
         Ok(())
+    }
+
+    /// max(sum |u_a| / h_a) [1/s] that the fluid will have next to grains whose velocities were set
+    /// or prescribed since the last step.
+    pub(super) fn rate_of_set_velocities(&self) -> f64 {
+        let spacing = self.setup.finest_spacing();
+        let per_cell: f64 = self.setup.mesh.resolved_axes().map(|axis| 1.0 / spacing[axis]).sum();
+        let set = self.setup.grains.iter().zip(&self.data.previous).filter(|(grain, previous)| {
+            !grain.has_left() && grain.rigid_velocity() != previous.velocity
+        });
+        let rate = |(grain, _): (&Grain, _)| {
+            let translation: f64 = (self.setup.mesh.resolved_axes())
+                .map(|axis| grain.velocity[axis].abs() / spacing[axis])
+                .sum();
+            let rotation = grain.angular_velocity.length() * grain.shape.bounding_radius();
+            FLUID_BESIDE * translation + rotation * per_cell
+        };
+        set.map(rate).fold(0.0, f64::max)
     }
 
     fn check_control(

@@ -174,6 +174,19 @@ impl Setup {
         self.refined_mesh().map_or(self.mesh.spacing, |mesh| mesh.spacing)
     }
 
+    /// Longest step [s] in which an `acceleration` [m/s^2] from rest moves nothing by more than
+    /// `cfl` cells.
+    pub(super) fn longest_step_from_rest(&self, acceleration: f64) -> f64 {
+        let spacing = self.finest_spacing();
+        let axes = self.mesh.resolved_axes().map(|axis| spacing[axis]);
+        match self.step {
+            StepRule::Limits { cfl, .. } if acceleration > 0.0 => {
+                (cfl * axes.fold(f64::INFINITY, f64::min) / acceleration).sqrt()
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Refined box around the present grains, if the set-up has one.
     pub(super) fn refined_box(&self) -> Option<RefinedBox> {
         let is_refined = self.refinement > 1 && self.fluid.is_some();

@@ -33,7 +33,8 @@ impl Simulation {
     /// The simulation cannot be continued from such a state.
     pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {
         assert!(horizon > 0.0, "a step ends after the present time, not {horizon} s from it");
-        let rate = (self.fluid.as_ref()).map_or(0.0, |fluid| fluid.measures().max_rate);
+        let rate = (self.fluid.as_ref())
+            .map_or(0.0, |fluid| fluid.measures().max_rate.max(self.rate_of_set_velocities()));
         let dt = self.clock.next_step(rate, horizon);
         match Start::prepare(self, dt) {
             Start::Coupled(start) => {

@@ -204,12 +204,11 @@ impl PairHistory<'_> {
         (to > from).then(|| fallen / (to - from) / self.scales.velocity())
     }
 
-    /// Settling speed of the largest magnitude up to a time [sqrt(d g)].
+    /// Largest settling speed up to a time [sqrt(d g)].
     fn peak_speed(&self, grain: usize, until: f64) -> Option<f64> {
         let h = self.grains[grain];
         let rows = h.time.partition_point(|t| *t <= until);
-        let speed = |v: &DVec3| -v.dot(self.up) / self.scales.velocity();
-        h.velocity[..rows].iter().map(speed).max_by(|a, b| a.abs().total_cmp(&b.abs()))
+        Some(peak_speed(h, rows, self.up)? / self.scales.velocity())
     }
 
     /// Mean angle of the long axis (x of the body) with the vertical between two times [deg].
@@ -218,6 +217,15 @@ impl PairHistory<'_> {
         let rows = (0..h.len()).filter(|i| (from..=to).contains(&h.time[*i]));
         mean_tilt(h, rows, DVec3::X, self.up)
     }
+}
+
+/// Largest settling speed in the first `rows`, in the direction in which the grain has moved since
+/// its start [m/s]: the rebound from an impact does not count.
+pub(super) fn peak_speed(history: &History, rows: usize, up: DVec3) -> Option<f64> {
+    let fallen = history.position[0] - *history.position[..rows].last()?;
+    let sign = fallen.dot(up).signum();
+    let speeds = history.velocity[..rows].iter().map(|v| -sign * v.dot(up));
+    Some(sign * speeds.reduce(f64::max)?)
 }
 
 /// Mean angle of a body axis with the vertical over the given rows [deg]; none without rows.

@@ -13,7 +13,7 @@ use grainwake_report::run_folder::{History, RunFolder};
 use serde::{Deserialize, Serialize};
 
 use super::mean;
-use super::pair::mean_tilt;
+use super::pair::{mean_tilt, peak_speed};
 
 /// Measured values of settling grains. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,7 +22,7 @@ pub struct SettlingMeasures {
     pub grains: usize,
     /// Number of grains that landed.
     pub landed: usize,
-    /// Settling speed of largest magnitude of any grain [sqrt(d g)].
+    /// Largest settling speed of any grain [sqrt(d g)]; negative for rising grains.
     pub peak_speed: Option<f64>,
     /// Final settling speed, mean over the grains [sqrt(d g)].
     pub final_speed: Option<f64>,
@@ -30,7 +30,7 @@ pub struct SettlingMeasures {
     pub mean_speed: Option<f64>,
     /// Relative change of the speed over the final window, mean over the grains.
     pub speed_change: Option<f64>,
-    /// Settling speed of largest magnitude of any grain [m/s].
+    /// Largest settling speed of any grain [m/s]; negative for rising grains.
     pub peak_speed_m_per_s: Option<f64>,
     /// Final settling speed, mean over the grains [m/s].
     pub final_speed_m_per_s: Option<f64>,
@@ -61,7 +61,7 @@ pub struct GrainSettling {
     pub grain: usize,
     /// Equal-volume diameter [m].
     pub diameter_m: f64,
-    /// Settling speed of largest magnitude [m/s].
+    /// Largest settling speed [m/s]; negative for a rising grain.
     pub peak_speed_m_per_s: f64,
     /// Reynolds number of the largest speed.
     pub peak_reynolds: Option<f64>,
@@ -174,8 +174,7 @@ impl GrainSettling {
         let last = *history.time.last().unwrap_or(&0.0);
         let until = landing.unwrap_or(last).min(last);
         let rows = history.time.partition_point(|t| *t <= until).max(1);
-        let speeds = history.velocity[..rows].iter().map(|v| -v.dot(up));
-        let peak = speeds.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        let peak = peak_speed(history, rows, up).unwrap_or(0.0);
         let reynolds = |v: f64| Some(v.abs() * diameter / run.facts.viscosity?);
         let window = FinalWindow::find(history, up, rows, diameter, landing.is_some());
         let terminal = window.as_ref().map(|w| w.fallen / (w.to - w.from));
@@ -312,8 +311,12 @@ mod tests {
         };
         let mut run = run_of(vec![falling(v, 2.0)]);
         land(&mut run, 0, 1.0);
+        // The row of the landing has the velocity of the rebound.
+        let landing = run.grains[0].time.partition_point(|t| *t <= 1.0) - 1;
+        run.grains[0].velocity[landing].z = 0.3;
         let found = SettlingMeasures::from_run(&run).unwrap();
         assert!((found.final_speed_m_per_s.unwrap() - 0.1).abs() < 1e-6);
+        assert!((found.peak_speed_m_per_s.unwrap() - 0.1).abs() < 1e-9);
         assert_eq!((found.landed, found.landing_time_s), (1, Some(1.0)));
         assert!((found.landing_time.unwrap() - 1.0 / 1e-3_f64.sqrt()).abs() < 1e-9);
         assert!((found.mean_speed.unwrap() * 0.1_f64.sqrt() - 0.095).abs() < 1e-4);
