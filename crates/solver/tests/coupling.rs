@@ -371,6 +371,28 @@ fn rebound(density: f64, length: f64, phase: f64) -> f64 {
     -sim.grains()[0].velocity.z / before
 }
 
+/// Output shows the velocity with which a grain moves, not one that the added mass still takes up.
+#[test]
+fn the_velocity_after_an_impact_is_that_of_the_path() {
+    let mut ball = sphere(1.0, DVec3::new(1.51, 1.52, 0.7), 1.5);
+    ball.velocity.z = -1.0;
+    let mut case = setup([24, 24, 32], 0.125, [PERIODIC, PERIODIC, WALLS], 5e-4, vec![ball]);
+    case.contact.added_density = 0.8;
+    case.contact.normal_stiffness = 2.3 * PI / 6.0 * (PI / 0.002_f64).powi(2);
+    case.step = StepRule::Fixed(0.01);
+    let mut sim = Simulation::new(case).unwrap();
+    while sim.contacts().is_empty() {
+        sim.step(f64::INFINITY).unwrap();
+        assert!(sim.time() < 1.0, "no impact");
+    }
+    let [shown, with_added] = [sim.grain_velocity(0).linear, sim.grains()[0].velocity].map(|v| v.z);
+    let start = sim.grains()[0].pose.position.z;
+    sim.step(f64::INFINITY).unwrap();
+    let moved = (sim.grains()[0].pose.position.z - start) / sim.time_step();
+    assert!((shown / moved - 1.0).abs() < 0.1, "{shown} at {moved}");
+    assert!(with_added > 1.5 * moved, "{with_added} at {moved}");
+}
+
 /// An undamped impact reverses the added mass along with the grain, whether the contact lasts less
 /// than a step or several.
 #[test]

@@ -7,6 +7,7 @@ use glam::DVec3;
 use grainwake_formats::vtp::Surface;
 use grainwake_shape::Shape;
 use grainwake_solver::dem::Grain;
+use grainwake_solver::sim::Simulation;
 
 /// Largest number of triangles in one file; finer surfaces are simplified.
 pub(super) const MAX_TRIANGLES: usize = 400_000;
@@ -52,16 +53,16 @@ impl Surfaces {
     }
 
     /// Returns the surfaces at the poses of the grains, with their velocities [m/s].
-    pub fn at(&self, grains: &[Grain], time: f64) -> Surface {
-        let mut surface = Surface { time: Some(time), ..Surface::default() };
+    pub fn at(&self, sim: &Simulation) -> Surface {
+        let mut surface = Surface { time: Some(sim.time()), ..Surface::default() };
         let (mut velocity, mut owners) = (Vec::new(), Vec::new());
-        let all = grains.iter().zip(&self.by_grain).enumerate();
+        let all = sim.grains().iter().zip(&self.by_grain).enumerate();
         for (index, (grain, body)) in all.filter(|(_, (grain, _))| !grain.has_left()) {
-            let first = surface.points.len();
+            let (first, moves) = (surface.points.len(), sim.grain_velocity(index));
             for point in &body.points {
                 let point = grain.pose.to_space(*point);
                 surface.points.push(point);
-                velocity.push(grain.velocity_at(point));
+                velocity.push(moves.at(point - grain.pose.position));
             }
             let shifted = |triangle: &[u32; 3]| triangle.map(|corner| first + corner as usize);
             surface.triangles.extend(body.triangles.iter().map(shifted));

@@ -206,13 +206,14 @@ fn grain_rows(sim: &Simulation) -> String {
     let mut text = String::new();
     let all = sim.grains().iter().zip(sim.loads()).enumerate();
     for (index, (grain, load)) in all.filter(|(_, (grain, _))| !grain.has_left()) {
+        let velocity = sim.grain_velocity(index);
         let row = GrainRow {
             time: sim.time(),
             grain: index,
             position: grain.pose.position,
-            velocity: grain.velocity,
+            velocity: velocity.linear,
             orientation: grain.pose.orientation,
-            angular_velocity: grain.angular_velocity,
+            angular_velocity: velocity.angular,
             force: Some(load.force),
             torque: Some(load.torque),
             contacts: Some(contacts[index]),

@@ -68,7 +68,7 @@ impl VtkOutput {
         }
         let file = format!("grains/grains_{tag}.vtp");
         let path = run.join(&file);
-        let surface = self.surfaces.at(sim.grains(), sim.time());
+        let surface = self.surfaces.at(sim);
         vtp::write(&path, &surface).context("write", &path)?;
         Ok(vec![Entry { time: sim.time(), group: "grains".into(), file }])
     }

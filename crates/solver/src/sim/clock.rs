@@ -119,7 +119,7 @@ mod tests {
                 max_step: f64::INFINITY,
             },
             viscous_rate: 1.0,
-            longest_next: last,
+            longest_next: f64::INFINITY,
         };
         let mut steps = Vec::new();
         while clock.time < 1.0 - 1e-9 {

@@ -28,7 +28,7 @@ use crate::dem::{
 };
 use crate::grid::Mesh;
 use crate::immersed::{OpenSides, PreviousStep};
-use crate::math::{Load, Pose};
+use crate::math::{Load, Pose, RigidVelocity};
 
 use clock::Clock;
 use fluid::Fluid;
@@ -154,6 +154,13 @@ impl Simulation {
     /// Grains in their present state.
     pub fn grains(&self) -> &[Grain] {
         &self.setup.grains
+    }
+    /// Velocities with which a grain moves. In the step of an impact in a fluid those of
+    /// [`Simulation::grains`] are larger: they contain a part that the added mass takes up in the
+    /// next step (decision 0014).
+    pub fn grain_velocity(&self, grain: usize) -> RigidVelocity {
+        let pending = self.data.previous[grain].pending_added_mass_velocity;
+        self.setup.grains[grain].rigid_velocity() - pending
     }
     /// Mean hydrodynamic load on each grain over the last step (Eq. 5), without buoyancy: force [N]
     /// and torque about the centroid [N m], space frame.

@@ -181,13 +181,16 @@ fn test_3_normal_impact_with_restitution() {
     }
 }
 
-/// A step is longer than the contact, as in a run.
+/// A step is longer than the contact, as in a run, which begins anywhere within a sub-step.
 #[test]
 fn restitution_with_the_default_substeps() {
-    let modulus = 1e7;
-    for (restitution, bound) in [(0.9, 0.002), (0.5, 0.006), (0.1, 0.006)] {
+    // The ball moves by 2.7 um in a sub-step.
+    let (modulus, phases) =
+        (1e7, [0.0, 0.34e-6, 0.68e-6, 1.02e-6, 1.36e-6, 1.7e-6, 2.04e-6, 2.38e-6]);
+    let bounds = [(0.9, 0.002), (0.5, 0.007), (0.1, 0.007)];
+    for ((restitution, bound), gap) in bounds.iter().flat_map(|of| phases.map(|gap| (*of, gap))) {
         let material = Material { restitution, ..material(modulus, 0.3) };
-        let mut ball = grain(0.001, 2500.0, material, DVec3::Z * 0.001);
+        let mut ball = grain(0.001, 2500.0, material, DVec3::Z * (0.001 + gap));
         ball.velocity.z = -0.3;
         let duration = hertz(ball.mass(), 0.001, modulus / (1.0 - 0.09), 0.3).duration;
         let substeps_per_contact = ContactParams::default().substeps_per_contact;

@@ -228,3 +228,23 @@ fn sphere_rolls_down_an_incline_at_five_sevenths() {
     let (s, c) = 30f64.to_radians().sin_cos();
     assert!((a - 9.81 * (s - 0.1 * c)).abs() < 2e-3 * a, "sliding: {a}");
 }
+
+/// A grain whose translation is fixed takes up the spin of rolling on a moving wall.
+#[test]
+fn a_grain_on_a_fixed_axle_rolls_on_a_belt() {
+    let (radius, speed) = (1e-3, 0.1);
+    for dt in [1e-3_f64, 1e-5, 1e-6] {
+        let mut grains = [sphere(radius, 2500.0, 2000, DVec3::Z * 0.995 * radius)];
+        grains[0].translation = MotionConstraint::Prescribed(DVec3::ZERO);
+        let mut belt = floor();
+        belt.sides[2][0] = Side::Wall { velocity: DVec3::X * speed };
+        let params =
+            ContactParams { normal_stiffness: 500.0, restitution: 0.5, ..Default::default() };
+        let mut dynamics = ContactDynamics::new(params, belt);
+        for _ in 0..(0.01 / dt).round() as usize {
+            step(&mut dynamics, &mut grains, DVec3::ZERO, dt);
+        }
+        let spin = grains[0].angular_velocity.y.abs() * radius / speed;
+        assert!((spin - 1.0).abs() < 0.01, "dt {dt}: {spin}");
+    }
+}

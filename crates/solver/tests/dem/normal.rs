@@ -395,3 +395,26 @@ fn a_film_takes_its_speed_whatever_the_step() {
         assert!((rebound / expected - 1.0).abs() < 0.02, "dt {dt}: {rebound} against {expected}");
     }
 }
+
+#[test]
+fn a_thick_film_slows_a_sphere_in_steps_of_one_substep() {
+    // The explicit force of the film would reverse the speed many times over in a sub-step.
+    let (radius, gap) = (1e-3, 5e-6);
+    let params = ContactParams {
+        lubrication_gap: 2.5e-4,
+        lubrication_viscosity: 10.0,
+        roughness: 3e-6,
+        ..smooth(1e3)
+    };
+    for dt in [1e-6_f64, 5e-6, 1e-4] {
+        let mut grains = [sphere(radius, 1500.0, 600, DVec3::Z * (radius + gap))];
+        grains[0].velocity.z = -1e-4;
+        let mut dynamics = ContactDynamics::new(params, floor());
+        for _ in 0..(1e-3 / dt).round() as usize {
+            dynamics.advance(&mut grains, &[], dt, &mut [Load::default()]);
+            let speed = grains[0].velocity.z;
+            assert!(speed.abs() < 1.0001e-4 && speed < 1e-5, "dt {dt}: {speed}");
+        }
+        assert!(grains[0].velocity.z.abs() < 1e-8, "dt {dt}: {}", grains[0].velocity.z);
+    }
+}

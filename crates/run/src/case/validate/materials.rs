@@ -43,6 +43,15 @@ pub(super) fn materials(
         grain.material = material?;
     }
     let Some(modulus) = &contact.wall_youngs_modulus else {
+        if let Some(ratio) = &contact.wall_poisson_ratio {
+            let message =
+                "walls without wall_youngs_modulus are rigid: wall_poisson_ratio has no effect";
+            check.fail(
+                &ratio.span,
+                message,
+                "add wall_youngs_modulus, or remove wall_poisson_ratio",
+            );
+        }
         return Some(Material::RIGID);
     };
     let ratio = (contact.wall_poisson_ratio.as_ref()).or(contact.poisson_ratio.as_ref());

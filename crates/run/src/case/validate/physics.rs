@@ -129,11 +129,15 @@ pub(super) fn contact(
 ) -> Option<ContactParams> {
     let before = check.problems.len();
     let defaults = ContactParams::default();
+    let tangential_ratio = match &raw.tangential_ratio {
+        // Sub-steps follow the normal spring, and a ratio of 0 would turn off the friction.
+        Some(ratio) => check.within(ratio, 1e-3, 1.0),
+        None => Some(defaults.tangential_ratio),
+    };
     let mut or_default = |value: &Option<Located<Quantity<Number>>>, default| match value {
         Some(value) => check.not_negative(value),
         None => Some(default),
     };
-    let tangential_ratio = or_default(&raw.tangential_ratio, defaults.tangential_ratio);
     let tangential_damping = or_default(&raw.tangential_damping, defaults.tangential_damping);
     let wall_friction = or_default(&raw.wall_friction, raw.friction.si);
     let friction = check.not_negative(&raw.friction);
@@ -149,6 +153,10 @@ pub(super) fn contact(
         check.within(limit, 1e-3, 0.5)?;
     }
     let overlap_limit = overlap_limit(raw);
+    if let Some(given) = raw.roughness.as_ref().filter(|_| lubrication_gap == Some(0.0)) {
+        let message = "a roughness needs a lubrication gap";
+        check.fail(&given.span, message, "add lubrication_gap, or remove roughness");
+    }
     if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
         let message = format!("a lubrication gap of {} needs a fluid", length(gap));
         let help = "add [fluid] or set lubrication_gap = 0";

@@ -3,7 +3,9 @@
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
 use crate::number_format::number;
 use grainwake_shape::Field;
-use grainwake_solver::dem::{ContactDynamics, ContactLawKind, Grain, initial_overlaps};
+use grainwake_solver::dem::{
+    ContactDynamics, ContactLawKind, ContactParams, Grain, initial_overlaps,
+};
 use grainwake_solver::math::Load;
 use grainwake_solver::sim::Setup;
 
@@ -27,6 +29,26 @@ pub(super) fn long_substeps(setup: &Setup) -> Option<String> {
         format!(
             "{} sub-steps per contact are unstable for flat faces, which never come to rest: take [contact] substeps_per_contact of {STABLE_SUBSTEPS} or more",
             number(substeps)
+        )
+    })
+}
+
+/// Sub-steps that are too few for the restitution of a dashpot.
+pub(super) fn few_substeps(setup: &Setup) -> Option<String> {
+    let contact = &setup.contact;
+    let least = match contact.law {
+        ContactLawKind::Linear => Some(contact.restitution),
+        ContactLawKind::HertzMindlin => {
+            setup.grains.iter().map(|grain| grain.material.restitution).reduce(f64::min)
+        }
+    };
+    let substeps = contact.substeps_per_contact;
+    let defaults = ContactParams::default().substeps_per_contact;
+    (least.is_some_and(|least| least < 1.0) && substeps < defaults).then(|| {
+        format!(
+            "{} sub-steps per contact do not resolve the dashpots: impacts return another speed than the restitution; take [contact] substeps_per_contact of {} or more",
+            number(substeps),
+            number(defaults)
         )
     })
 }

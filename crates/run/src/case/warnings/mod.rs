@@ -36,6 +36,7 @@ pub(super) fn warnings(
     found.extend(resolution::resolution_and_cost(setup, e));
     found.extend(contact::deep_impacts(setup));
     found.extend(contact::long_substeps(setup));
+    found.extend(contact::few_substeps(setup));
     found.extend(contact::start_out_of_balance(setup));
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));

@@ -24,7 +24,7 @@ pub use parameters::{ContactLawKind, ContactParams};
 use glam::DVec3;
 
 use super::enclosure::{PairKey, Partner};
-use super::search::ContactPatch;
+use super::search::{ContactPatch, ContactPoint};
 use crate::math::Load;
 
 /// Contact of a step; `grain` < partner if the partner is a grain, and equal if a grain touches its
@@ -94,6 +94,10 @@ pub(in crate::dem) struct ContactRecord {
     pub next_history: Vec<TangentialHistory>,
     /// Penetrating points of the last search.
     pub patch: ContactPatch,
+    /// Whether the last search had to look for penetrating points.
+    pub may_interact: bool,
+    /// Closest points of a pair without penetrating points, if a force acts across the gap.
+    pub closest: Option<ContactPoint>,
     /// Loads of the last evaluation.
     pub loads: PairLoads,
 }
@@ -128,6 +132,8 @@ impl ContactRecord {
             history: Vec::new(),
             next_history: Vec::new(),
             patch: ContactPatch::default(),
+            may_interact: false,
+            closest: None,
             loads: PairLoads::default(),
         }
     }

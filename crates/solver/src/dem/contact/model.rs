@@ -111,7 +111,6 @@ impl ContactModel {
     pub fn evaluate(
         &self,
         record: &mut ContactRecord,
-        closest: Option<ContactPoint>,
         friction: f64,
         pair: &PairKinematics,
         step: f64,
@@ -120,8 +119,8 @@ impl ContactModel {
         let properties = PairProperties::new(&a.properties, &b.properties);
         let Some(mean) = PatchMean::of(&record.patch.points, pair) else {
             record.end_contact();
-            if let Some(closest) = closest {
-                record.loads = self.lubrication(&closest, &properties, pair, step);
+            if let Some(closest) = record.closest {
+                record.loads = self.lubrication(&closest, &properties, pair);
             }
             return;
         };
@@ -157,7 +156,7 @@ impl ContactModel {
             let (share, derivative) = mean.weight_and_derivative(point);
             // The local closing speed also damps rocking on a flat face.
             let approach = pair.relative_velocity(point.lever_arm, |v| v.end).dot(point.normal);
-            let damping = pair.stable_damping(damping, point.lever_arm, point.normal, step);
+            let damping = pair.stable_damping(damping, point.lever_arm, point.normal);
             let normal_force = self.law.normal_force(elastic_force, damping, approach);
             let dashpot_force = share * (normal_force - elastic_force);
             let mut force =
@@ -195,7 +194,6 @@ impl ContactModel {
         closest: &ContactPoint,
         properties: &PairProperties,
         pair: &PairKinematics,
-        step: f64,
     ) -> PairLoads {
         let (params, range) = (&self.params, self.range());
         let ContactPoint { overlap, lever_arm, normal, .. } = *closest;
@@ -209,7 +207,7 @@ impl ContactModel {
             * properties.reduced_radius.powi(2);
         let film = gap.max(params.roughness).min(range);
         let resistance = strength * (1.0 / film - 1.0 / range);
-        let resistance = pair.stable_damping(resistance, lever_arm, normal, step);
+        let resistance = pair.stable_damping(resistance, lever_arm, normal);
         let approach = pair.relative_velocity(lever_arm, |v| v.end).dot(normal);
         let [on_grain, on_partner] = pair.loads(-resistance * approach * normal, lever_arm);
         PairLoads { overlap, on_grain, on_partner, lever_arm, normal, elastic_energy: 0.0 }
@@ -221,8 +219,8 @@ impl ContactModel {
 /// A new contact begins inside the sub-step. Its dashpot force does not start from zero, so only
 /// the part of the sub-step in contact counts.
 fn begin_or_continue(record: &mut ContactRecord, mean: &PatchMean, step: f64) -> f64 {
-    if !record.in_contact && mean.approach * step > mean.overlap {
-        let time_in_contact = mean.overlap / mean.approach;
+    if !record.in_contact && step > 0.0 && mean.approach > 0.0 {
+        let time_in_contact = step.min(mean.overlap / mean.approach);
         record.dashpot_fraction = 0.5 + time_in_contact / step;
         return time_in_contact;
     }
@@ -277,6 +275,8 @@ pub(in crate::dem) struct PairKinematics {
     pub branch: DVec3,
     /// First grain and its partner.
     pub bodies: [BodyState; 2],
+    /// Sub-step in which dashpots must be stable [s].
+    pub stable_step: f64,
 }
 
 impl PairKinematics {
@@ -298,13 +298,13 @@ impl PairKinematics {
     }
 
     /// Limits the coefficient of a dashpot [N s/m] that acts along the unit vector `direction` at a
-    /// point: within a sub-step of `step` [s], an explicit dashpot must not reverse the velocity of
-    /// the point, which follows a force at the edge of a flat grain more easily than the centroid.
-    fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3, step: f64) -> f64 {
+    /// point: within a sub-step, an explicit dashpot must not reverse the velocity of the point,
+    /// which follows a force at the edge of a flat grain more easily than the centroid.
+    fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3) -> f64 {
         if damping == 0.0 {
             return 0.0;
         }
-        let [a, b] = &self.bodies;
+        let ([a, b], step) = (&self.bodies, self.stable_step);
         let mobility =
             a.mobility(lever_arm, direction) + b.mobility(lever_arm + self.branch, direction);
         if step * mobility * damping > 0.5 { 0.5 / (step * mobility) } else { damping }
@@ -356,7 +356,7 @@ impl FrictionStep {
         let displacement = earlier + self.time_in_contact * tangential(velocity);
         let sliding = tangential(pair.relative_velocity(point.lever_arm, |v| v.end));
         let direction = sliding.normalize_or_zero();
-        let damping = pair.stable_damping(self.damping, point.lever_arm, direction, self.step);
+        let damping = pair.stable_damping(self.damping, point.lever_arm, direction);
         let viscous = damping * sliding;
         let force = -(self.stiffness * displacement + viscous);
         // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.

@@ -44,9 +44,10 @@ impl ContactDynamics {
     /// Returns the number of sub-steps.
     fn run_substeps(&mut self, grains: &mut [Grain], dt: f64) -> usize {
         let damping = self.model.params.global_damping;
-        self.compute_contacts(grains, 0.0);
+        self.find_contacts(grains, 0.0);
         let (mut done, mut time_left) = (0, dt);
         let mut substeps_left = self.substeps_for(grains, time_left);
+        self.compute_contacts(grains, [0.0, dt / substeps_left as f64]);
         while substeps_left > 0 {
             let step = time_left / substeps_left as f64;
             let half_mean = 0.5 * step / dt;
@@ -63,7 +64,8 @@ impl ContactDynamics {
                     substeps_left = self.substeps_for(grains, time_left);
                 }
             }
-            self.compute_contacts(grains, step);
+            self.find_contacts(grains, step);
+            self.compute_contacts(grains, [step; 2]);
             for (grain, body) in grains.iter_mut().zip(&mut self.bodies) {
                 body.mean_contact += body.contact * half_mean;
                 body.second_half_step(grain, damping, step);
@@ -86,10 +88,13 @@ impl ContactDynamics {
                 Some(response) => response.acceleration(&load)[0].length(),
                 None => load.force.length() * body.own_inverse_mass,
             };
-            body.state.properties.inverse_mass = match &body.response {
+            let inverse_mass = match &body.response {
                 Some(response) => response.inverse_mass(),
                 None => grain.inverse_mass(self.model.params.added_density),
             };
+            let turns_only = inverse_mass == 0.0 && grain.rotation == MotionConstraint::Free;
+            body.state.properties.inverse_mass =
+                if turns_only { inverse_mass_of_turning(grain) } else { inverse_mass };
             body.speed_gain = dt * acceleration;
             let speed = match grain.translation {
                 MotionConstraint::Free => grain.velocity.length() + 0.5 * dt * acceleration,
@@ -159,22 +164,31 @@ impl ContactDynamics {
         (&self.bodies[key.grain as usize], key.partner.grain().map(|j| &self.bodies[j]))
     }
 
-    /// Evaluates the contact loads at the present poses; `step` [s] is the time since the last
-    /// evaluation.
-    fn compute_contacts(&mut self, grains: &[Grain], step: f64) {
+    /// Finds the penetrating points of all pairs at the present poses; `step` [s] is the time since
+    /// the last search.
+    fn find_contacts(&mut self, grains: &[Grain], step: f64) {
         for (grain, body) in grains.iter().zip(&mut self.bodies) {
             body.update_kinematics(grain, step);
         }
+        self.for_each_record(|contacts, record| contacts.find_points(record, grains));
+    }
+
+    /// Calls `each` for all pairs. Each pair writes its own record, so results do not depend on the
+    /// number of threads.
+    fn for_each_record(&mut self, each: impl Fn(&ContactDynamics, &mut ContactRecord) + Sync) {
         let mut records = std::mem::take(&mut self.records);
-        let evaluate = |record: &mut ContactRecord| self.evaluate_pair(record, grains, step);
-        // Each pair writes its own record and the records are summed in order, so results do not
-        // depend on the number of threads.
         if records.len() < PARALLEL_PAIRS {
-            records.iter_mut().for_each(evaluate);
+            records.iter_mut().for_each(|record| each(self, record));
         } else {
-            records.par_iter_mut().with_min_len(4).for_each(evaluate);
+            records.par_iter_mut().with_min_len(4).for_each(|record| each(self, record));
         }
         self.records = records;
+    }
+
+    /// Evaluates the loads of the penetrating points; `steps` are the time since the last
+    /// evaluation and the sub-step in which dashpots must be stable [s].
+    fn compute_contacts(&mut self, grains: &[Grain], steps: [f64; 2]) {
+        self.for_each_record(|contacts, record| contacts.evaluate_pair(record, grains, steps));
         for record in &self.records {
             self.bodies[record.key.grain as usize].contact += record.loads.on_grain;
             if let Partner::Grain(j) = record.key.partner {
@@ -183,39 +197,68 @@ impl ContactDynamics {
         }
     }
 
-    /// Finds the penetrating points of a pair and evaluates its loads (Eqs 7-18).
-    fn evaluate_pair(&self, record: &mut ContactRecord, grains: &[Grain], step: f64) {
+    /// Finds the penetrating points of a pair (Eqs 7 and 8).
+    fn find_points(&self, record: &mut ContactRecord, grains: &[Grain]) {
         let (body, partner) = self.bodies_of(&record.key);
         let partner_displacement = partner.map_or(0.0, |partner| partner.displacement);
         record.patch.approach(MOTION_MARGIN * (body.displacement + partner_displacement));
-        if record.patch.separation > 0.0 {
+        record.may_interact = record.patch.separation <= 0.0;
+        if !record.may_interact {
             return;
         }
-        let (params, reach) = (&self.model.params, self.model.range());
+        let reach = self.model.range();
         let a = body.posed_shape(grains[record.key.grain as usize].pose.position);
-        let mut branch = DVec3::ZERO;
-        let (friction, other, closest) = match record.key.partner {
+        record.closest = match record.key.partner {
             Partner::Grain(j) => {
                 let image = IVec3::from(record.key.image).as_dvec3() * self.enclosure.period();
                 let b = self.bodies[j].posed_shape(grains[j].pose.position + image);
-                branch = a.position - b.position;
-                let closest = record.patch.find_grain_contact(&a, &b, reach);
-                (params.friction, self.bodies[j].state, closest)
+                record.patch.find_grain_contact(&a, &b, reach)
             }
             Partner::Wall { axis, side } => {
-                let (axis, side) = (axis as usize, side as usize);
-                let face = self.enclosure.plane(axis, side);
-                let offset = face.distance(a.position);
-                let closest = record.patch.find_wall_contact(&a, face.inward, offset, reach);
-                let (friction, velocity) = match self.enclosure.sides[axis][side] {
+                let face = self.enclosure.plane(axis as usize, side as usize);
+                record.patch.find_wall_contact(&a, face.inward, face.distance(a.position), reach)
+            }
+        };
+        let overlaps = record.patch.points.iter().map(|point| point.overlap);
+        record.loads.overlap = overlaps.fold(0.0, f64::max);
+    }
+
+    /// Evaluates the loads of a pair at the points found (Eqs 9-18).
+    fn evaluate_pair(
+        &self,
+        record: &mut ContactRecord,
+        grains: &[Grain],
+        [step, stable_step]: [f64; 2],
+    ) {
+        if !record.may_interact {
+            return;
+        }
+        let params = &self.model.params;
+        let (body, position) = (self.bodies_of(&record.key).0, |i: usize| grains[i].pose.position);
+        let (friction, other, branch) = match record.key.partner {
+            Partner::Grain(j) => {
+                let image = IVec3::from(record.key.image).as_dvec3() * self.enclosure.period();
+                let branch = position(record.key.grain as usize) - (position(j) + image);
+                (params.friction, self.bodies[j].state, branch)
+            }
+            Partner::Wall { axis, side } => {
+                let (friction, velocity) = match self.enclosure.sides[axis as usize][side as usize]
+                {
                     Side::Wall { velocity } => (params.wall_friction, velocity),
                     Side::Open | Side::Frictionless => (0.0, DVec3::ZERO),
                 };
-                (friction, BodyState::translating(self.model.wall, velocity), closest)
+                (friction, BodyState::translating(self.model.wall, velocity), DVec3::ZERO)
             }
         };
-        let pair = PairKinematics { branch, bodies: [body.state, other] };
-        self.model.evaluate(record, closest, friction, &pair, step);
+        let pair = PairKinematics { branch, bodies: [body.state, other], stable_step };
+        self.model.evaluate(record, friction, &pair, step);
         record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
     }
+}
+
+/// Inverse of the mass that resists a tangential force at the surface of a grain that turns freely
+/// about a prescribed centroid [1/kg].
+fn inverse_mass_of_turning(grain: &Grain) -> f64 {
+    let radius = 0.5 * grain.shape.equivalent_diameter();
+    3.0 * radius * radius / grain.principal_inertia().element_sum()
 }
