@@ -98,6 +98,14 @@ impl Opened {
             None
         };
         let begin = begin(own, self.resuming, parent, sim, note)?;
+        if let (Begin::Resumed(_), end) = (&begin, job.plan.end)
+            && sim.time() > end * (1.0 + SAME_TIME)
+        {
+            let [reached, end] = [sim.time(), end].map(|time| quantity(time, "s"));
+            let what = format!("has reached t = {reached}, after the end at {end}");
+            let remedy = "give a later time.end, or another folder with -o";
+            return Err(RunError::occupied(&out, what, remedy));
+        }
         if let (None, Some(lost)) = (parent, &self.provenance.parent)
             && matches!(begin, Begin::Fresh)
         {

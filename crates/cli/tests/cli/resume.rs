@@ -602,6 +602,18 @@ fn a_resumed_run_finds_the_same_events_after_a_grain_has_left() {
 }
 
 #[test]
+fn an_end_before_the_checkpoint_is_refused() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.end=20 ms"]).success();
+    std::fs::remove_file(out.join("summary.json")).unwrap();
+    let refused = run(&case, &out, &["--set", "time.end=10 ms", "--resume"]).code(2);
+    let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(message.contains("reached t = 20 ms, after the end at 10 ms"), "{message}");
+    run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
+}
+
+#[test]
 fn a_run_that_finishes_after_a_failure_is_not_shown_as_failed() {
     let (folder, case) = folder_with(DRY);
     let out = folder.path().join("run");

@@ -122,7 +122,8 @@ fn symptom(time: f64, step: u64, what: &str, remedy: &Remedy) -> String {
         Remedy::StifferContact { .. } | Remedy::Unrefined => "the run was stopped",
         _ => "the run became unstable",
     };
-    format!("{failure} at t = {time:.6e} s (step {step}): {what}")
+    let time = if time < 1e-3 { format!("{time:.6e}") } else { format!("{time:.6}") };
+    format!("{failure} at t = {time} s (step {step}): {what}")
 }
 
 fn side_name(axis: usize, side: usize) -> String {
