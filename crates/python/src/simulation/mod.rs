@@ -210,7 +210,7 @@ impl PySimulation {
         force: bool,
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
-        let threads = threads::resolve(py, threads.map_or(given.threads, usize::from))?;
+        let threads = case.get().threads(py, threads.as_ref())?;
         let pool = threads::pool(threads)?;
         let (sim, recording) = match &output {
             Some(folder) => {
