@@ -59,7 +59,7 @@ pub fn seed(value: &Bound<'_, PyAny>) -> PyResult<u64> {
 
 /// Returns the argument `pixels`.
 pub fn pixels(value: &Bound<'_, PyAny>) -> PyResult<usize> {
-    value.extract::<Whole>()?.at_least("pixels", 1)
+    value.extract::<Whole>()?.at_least("pixels", 16)
 }
 
 /// Returns the argument `jobs`.

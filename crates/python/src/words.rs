@@ -75,9 +75,9 @@ fn replaced(text: &str, phrase: &str, other: &str) -> String {
     let (mut result, mut rest) = (String::new(), text);
     while let Some(at) = rest.find(phrase) {
         let (before, after) = (&rest[..at], &rest[at + phrase.len()..]);
-        let alone = !before.ends_with(in_word) && !(ends_in_word && after.starts_with(in_word));
+        let joined = before.ends_with(in_word) || ends_in_word && after.starts_with(in_word);
         result += before;
-        result += if alone { other } else { phrase };
+        result += if joined { phrase } else { other };
         rest = after;
     }
     result + rest

@@ -199,7 +199,7 @@ def test_counts_are_whole_numbers():
         (lambda: gw.Grain.family(0.7, 0.4, cells=-1), "cells: found -1"),
         (lambda: gw.scan(ball(), voxel="50 um", label=-1), "label: found -1"),
         (lambda: gw.scan(ball(), voxel="50 um", label=2**32), "label: 4294967296 is too large"),
-        (lambda: grain.picture(-1), "pixels: found -1"),
+        (lambda: grain.picture(-1), "pixels: found -1; expected a whole number from 16 on"),
         (lambda: grain.picture(pixels=10**5), "pixels: found 100000; expected 16 to 4096"),
     ]:
         with pytest.raises(gw.CaseError, match=words):
