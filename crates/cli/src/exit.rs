@@ -166,6 +166,9 @@ pub fn shape_help(error: &ShapeError) -> Option<String> {
         ShapeError::EmptyVolume | ShapeError::SolidVolume => {
             "check the grey values of the image; a grey image needs --threshold VALUE, otsu or otsu3"
         }
+        ShapeError::MedianWithoutThreshold => {
+            "add --threshold otsu or a grey value, or omit --median for an image of labels"
+        }
         ShapeError::CutByBorder { label, faces } if faces.split(", ").count() == 6 => {
             return Some(format!(
                 "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --pad includes it, truncated at the border; if the grains are darker than the void, invert the grey values first (ImageJ: Edit > Invert; NumPy: image.max() - image)"

@@ -3,18 +3,29 @@
 use glam::DVec3;
 use grainwake_run::case::quantity::{Kind, parse_quantity, without_unit};
 use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyString};
 
 use crate::error::input;
 
-/// Whole number from 0 on.
-#[derive(Clone, Copy)]
-pub struct Whole(usize);
+/// Whole number of any size; `at_least` checks it.
+pub struct Whole {
+    /// The number; none beyond 128 bits.
+    number: Option<i128>,
+    text: String,
+}
 
-impl From<Whole> for usize {
-    fn from(whole: Whole) -> usize {
-        whole.0
+impl Whole {
+    /// Returns the number, or the exception of one below `least` or beyond the type.
+    pub fn at_least<T: TryFrom<i128>>(&self, name: &str, least: i128) -> PyResult<T> {
+        let found = &self.text;
+        if self.number.map_or(found.starts_with('-'), |number| number < least) {
+            let expected = format!("expected a whole number from {least} on");
+            return Err(input(format!("{name}: found {found}; {expected}")));
+        }
+        let number = self.number.and_then(|number| T::try_from(number).ok());
+        number.ok_or_else(|| input(format!("{name}: {found} is too large")))
     }
 }
 
@@ -23,12 +34,42 @@ impl<'py> FromPyObject<'_, 'py> for Whole {
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Whole> {
         match value.extract::<i128>() {
-            Ok(number) => usize::try_from(number)
-                .map(Whole)
-                .map_err(|_| input(format!("found {number}; expected a whole number from 0 on"))),
+            Ok(number) => Ok(Whole { number: Some(number), text: number.to_string() }),
+            Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+                Ok(Whole { number: None, text: value.str()?.to_cow()?.into_owned() })
+            }
             Err(error) => Err(error),
         }
     }
+}
+
+/// Returns an optional whole number from `least` on.
+pub fn whole<T: TryFrom<i128>>(
+    name: &str,
+    given: Option<&Whole>,
+    least: i128,
+) -> PyResult<Option<T>> {
+    given.map(|given| given.at_least(name, least)).transpose()
+}
+
+/// Returns the argument `seed`.
+pub fn seed(value: &Bound<'_, PyAny>) -> PyResult<u64> {
+    value.extract::<Whole>()?.at_least("seed", 0)
+}
+
+/// Returns the argument `pixels`.
+pub fn pixels(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    value.extract::<Whole>()?.at_least("pixels", 16)
+}
+
+/// Returns the argument `jobs`.
+pub fn jobs(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    value.extract::<Whole>()?.at_least("jobs", 1)
+}
+
+/// Returns the argument `threads`.
+pub fn threads(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    value.extract::<Whole>()?.at_least("threads", 0)
 }
 
 /// Returns a quantity in SI units: a number is SI, a string carries its unit ("2 mm").
@@ -69,6 +110,16 @@ pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> 
     let part =
         |axis: &str, item: &Bound<'_, PyAny>| quantity::<K>(&format!("{name}, {axis}"), item);
     Ok(DVec3::new(part("x", x)?, part("y", y)?, part("z", z)?))
+}
+
+/// Returns `N` plain numbers of a sequence or an array.
+pub fn plain_numbers<const N: usize>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
+    let items: PyResult<Vec<f64>> =
+        value.try_iter().and_then(|items| items.map(|item| item?.extract()).collect());
+    items.ok().and_then(|items| items.try_into().ok()).ok_or_else(|| {
+        let found = value.repr().map_or_else(|_| "a value".into(), |text| text.to_string());
+        input(format!("{name}: found {found}; expected {N} numbers"))
+    })
 }
 
 /// Returns a value as an array of this type, contiguous with the last axis fastest; it is converted

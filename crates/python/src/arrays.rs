@@ -1,8 +1,8 @@
 //! Arrays for Python.
 
 use glam::DVec3;
-use numpy::ndarray::{Array1, Array2};
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::ndarray::{Array1, Array2, Dimension};
+use numpy::{Element, IntoPyArray, PyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 /// Returns vectors as an array of the shape (n, 3).
@@ -27,6 +27,14 @@ pub fn rows<'py, T: numpy::Element, const N: usize>(
 /// Returns numbers as an array of the shape (n,).
 pub fn numbers<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
     Array1::from_vec(values).into_pyarray(py)
+}
+
+/// Returns an array whose values can no longer be changed: that of a copy would have no effect.
+pub fn read_only<'py, T: Element, D: Dimension>(
+    array: Bound<'py, PyArray<T, D>>,
+) -> Bound<'py, PyArray<T, D>> {
+    array.readwrite().make_nonwriteable();
+    array
 }
 
 /// Returns a serialisable value as the Python object of its JSON.

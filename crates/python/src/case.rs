@@ -1,19 +1,23 @@
 //! `Case`: a validated case.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use grainwake_run::case::{Case, schema};
+use grainwake_run::case::{Case, ShapeFile, schema};
 use grainwake_run::number_format::number_of_grains;
 use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::types::{PyBytes, PyDict, PyList, PyString};
 
-use crate::arguments::Whole;
+use crate::arguments::{Whole, whole};
 use crate::arrays::json;
 use crate::case_dict::{override_list, to_toml};
-use crate::error::{IntoException, Raise, input, system};
+use crate::error::{IntoException, Raise, input, refused_dict, system};
 use crate::grain::PyGrain;
 use crate::{running, threads};
+
+/// Constructor of a pickled case and its arguments.
+type Reduced<'py> = (Bound<'py, PyAny>, (String, Vec<(String, Bound<'py, PyBytes>)>));
 
 /// Case: grains, fluid, box and outputs, read and validated.
 ///
@@ -38,6 +42,13 @@ pub struct PyCase {
     pub case: Case,
 }
 
+impl PyCase {
+    /// Returns the threads of a run: those given, or else those of the case.
+    pub fn threads(&self, py: Python<'_>, given: Option<&Whole>) -> PyResult<usize> {
+        threads::resolve(py, whole("threads", given, 0)?.unwrap_or(self.case.threads))
+    }
+}
+
 #[pymethods]
 impl PyCase {
     /// Read a case file.
@@ -49,7 +60,7 @@ impl PyCase {
     /// overrides : dict or sequence of str, optional
     ///     Values that replace those of the file, such as ``{"time.end": "0.5 s"}`` or
     ///     ``{"grain.0.density": 2600}``; None removes a key, so that its default applies. Or
-    ///     the strings of ``--set``, and ``"-KEY"`` for ``--unset KEY``.
+    ///     strings ``"time.end=0.5 s"``, and ``"-time.step"`` for a key that is removed.
     ///
     /// Returns
     /// -------
@@ -136,8 +147,8 @@ impl PyCase {
         let store = tempfile::tempdir().map_err(|e| system(e.kind(), e.to_string()))?;
         let text = to_toml(tables, store.path())?;
         let folder = std::path::absolute(&folder).unwrap_or(folder);
-        let case = py.detach(|| Case::parse(&text, "dict", &folder, &set)).raise()?;
-        Ok(PyCase { case })
+        let case = py.detach(|| Case::parse(&text, "dict", &folder, &set));
+        Ok(PyCase { case: case.map_err(|error| refused_dict(&error))? })
     }
 
     /// Build a case from the values that are given most often.
@@ -146,8 +157,8 @@ impl PyCase {
     /// ----------
     /// size : sequence of float or str
     ///     Edge lengths of the box [m].
-    /// cell_size : float or str
-    ///     Edge of a cell [m].
+    /// cell_size : float, str or sequence
+    ///     Edge of a cell [m], one or one per axis.
     /// refinement : int, optional
     ///     2 halves the cells in a box that follows the grains; 1 by default.
     /// refinement_margin : float, str or sequence, optional
@@ -156,9 +167,9 @@ impl PyCase {
     /// end : float or str
     ///     End of the run [s].
     /// grains : sequence of dict, default ()
-    ///     Entries of ``[[grain]]``, such as those of `Grain.at`.
+    ///     Entries of the list ``grain``, such as those of `Grain.at`.
     /// fluid : dict, optional
-    ///     Table ``[fluid]``: density and viscosity or kinematic_viscosity. Without it the run is
+    ///     Table ``fluid``: density and viscosity or kinematic_viscosity. Without it the run is
     ///     dry.
     /// gravity : sequence of float or str, optional
     ///     Gravity [m/s2]; (0, 0, -9.81) by default.
@@ -169,8 +180,8 @@ impl PyCase {
     /// folder : path-like, default "."
     ///     Folder that grain files are relative to.
     /// **tables
-    ///     Further tables: contact, coupling, output, run, expect, packing; a dict ``time`` is
-    ///     joined with `end`.
+    ///     Further tables: contact, coupling, output, run, expect, and the lists packing, poses
+    ///     and probe; a dict ``time`` is joined with `end`.
     ///
     /// Returns
     /// -------
@@ -182,7 +193,7 @@ impl PyCase {
         size: &Bound<'_, PyAny>,
         cell_size: &Bound<'_, PyAny>,
         end: &Bound<'_, PyAny>,
-        refinement: Option<usize>,
+        refinement: Option<Whole>,
         refinement_margin: Option<&Bound<'_, PyAny>>,
         grains: Option<&Bound<'_, PyAny>>,
         fluid: Option<&Bound<'_, PyAny>>,
@@ -195,7 +206,7 @@ impl PyCase {
         let domain = PyDict::new(py);
         domain.set_item("size", size)?;
         domain.set_item("cell_size", cell_size)?;
-        domain.set_item("refinement", refinement)?;
+        domain.set_item("refinement", whole::<i64>("refinement", refinement.as_ref(), 1)?)?;
         domain.set_item("refinement_margin", refinement_margin)?;
         domain.set_item("boundaries", boundaries)?;
         let time = PyDict::new(py);
@@ -235,6 +246,25 @@ impl PyCase {
         PyCase::from_dict(py, &all, folder, None)
     }
 
+    #[staticmethod]
+    fn _from_parts(
+        py: Python<'_>,
+        resolved: &str,
+        grains: Vec<(String, Vec<u8>)>,
+    ) -> PyResult<PyCase> {
+        let grains = grains.into_iter().map(|(name, bytes)| (name, Arc::new(bytes))).collect();
+        let case = py.detach(|| Case::from_resolved(resolved, grains)).raise()?;
+        Ok(PyCase { case })
+    }
+
+    /// Parts of a pickled case: its text with all defaults, and its grain files by name.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let (py, case) = (slf.py(), &slf.get().case);
+        let file = |(name, bytes): &ShapeFile| (name.clone(), PyBytes::new(py, bytes));
+        let grains = case.shapes.iter().map(file).collect();
+        Ok((slf.get_type().getattr("_from_parts")?, (case.resolved.clone(), grains)))
+    }
+
     /// JSON schema of a case file.
     ///
     /// Returns
@@ -255,7 +285,7 @@ impl PyCase {
     ///     Continue from the last checkpoint in the folder.
     /// force : bool, default False
     ///     Replace a run in the folder.
-    /// start_from : str, optional
+    /// start_from : path-like, optional
     ///     Start from a checkpoint of another run, "DIR" or "DIR@TIME": the newest one, or the
     ///     newest at or before the time.
     /// threads : int, optional
@@ -288,14 +318,14 @@ impl PyCase {
         folder: PathBuf,
         resume: bool,
         force: bool,
-        start_from: Option<String>,
+        start_from: Option<PathBuf>,
         threads: Option<Whole>,
         report: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(py, threads.map_or(self.case.threads, usize::from))?;
+        let threads = self.threads(py, threads.as_ref())?;
         let existing = running::existing(resume, force)?;
-        let parent = start_from.map(|text| running::parent(py, &self.case, &text)).transpose()?;
+        let parent = start_from.map(|from| running::parent(py, &self.case, &from)).transpose()?;
         running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
         if report {
             py.detach(|| grainwake_report::render(&folder))
@@ -320,7 +350,7 @@ impl PyCase {
         py: Python<'py>,
         threads: Option<Whole>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let threads = threads::resolve(py, threads.map_or(self.case.threads, usize::from))?;
+        let threads = self.threads(py, threads.as_ref())?;
         json(py, &self.case.estimate(threads))
     }
 

@@ -17,6 +17,8 @@ use pyo3::exceptions::{
 };
 use pyo3::prelude::*;
 
+use crate::words::{python_words, words_of_dict};
+
 pyo3::import_exception!(grainwake._errors, CaseError);
 pyo3::import_exception!(grainwake._errors, SolverError);
 
@@ -50,8 +52,18 @@ fn parts(problem: &Problem) -> Parts {
     )
 }
 
-/// Returns the exception of refused input.
+/// Returns the exception of refused input, in the names of Python.
 pub fn refused(problems: &[Problem]) -> PyErr {
+    refused_in(problems, python_words)
+}
+
+/// Returns the exception of a refused case that was given as a dict.
+pub fn refused_dict(error: &WrongCase) -> PyErr {
+    refused_in(error.problems(), words_of_dict)
+}
+
+fn refused_in(problems: &[Problem], words: fn(&str) -> String) -> PyErr {
+    let problems: Vec<Problem> = problems.iter().map(|p| p.clone().reworded(words)).collect();
     let texts: Vec<String> = problems.iter().map(rendered).collect();
     let all: Vec<Parts> = problems.iter().map(parts).collect();
     CaseError::new_err((texts.join("\n"), all))
@@ -59,19 +71,19 @@ pub fn refused(problems: &[Problem]) -> PyErr {
 
 /// Returns the exception of refused input with one message.
 pub fn input(message: impl Into<String>) -> PyErr {
-    let message = message.into();
+    let message = python_words(&message.into());
     let only: Parts = (None, message.clone(), None, None, None, None);
     CaseError::new_err((message, vec![only]))
 }
 
 /// Returns the exception of failed numerics.
 pub fn numerics(message: impl Into<String>) -> PyErr {
-    SolverError::new_err(message.into())
+    SolverError::new_err(python_words(&message.into()))
 }
 
 /// Returns the exception of the operating system for this kind of error.
 pub fn system(kind: io::ErrorKind, message: impl Into<String>) -> PyErr {
-    let message = message.into();
+    let message = python_words(&message.into());
     match kind {
         io::ErrorKind::NotFound => PyFileNotFoundError::new_err(message),
         io::ErrorKind::AlreadyExists => PyFileExistsError::new_err(message),
@@ -88,7 +100,9 @@ pub fn system(kind: io::ErrorKind, message: impl Into<String>) -> PyErr {
 pub fn warn(py: Python<'_>, notes: impl IntoIterator<Item = String>) -> PyResult<()> {
     let warnings = py.import("warnings")?;
     let kind = py.import("grainwake")?.getattr("CaseWarning")?;
-    notes.into_iter().try_for_each(|note| warnings.call_method1("warn", (note, &kind)).map(drop))
+    notes
+        .into_iter()
+        .try_for_each(|note| warnings.call_method1("warn", (python_words(&note), &kind)).map(drop))
 }
 
 /// Conversion of an error of a library to a Python exception.
@@ -125,7 +139,7 @@ impl IntoException for RunError {
             (RunError::Io { source, .. }, _) => system(source.kind(), message),
             (_, FailureKind::Input) => input(message),
             (_, FailureKind::Computation) => numerics(message),
-            (_, FailureKind::InputOutput) => PyOSError::new_err(message),
+            (_, FailureKind::InputOutput) => system(io::ErrorKind::Other, message),
         }
     }
 }
@@ -142,13 +156,15 @@ impl IntoException for ShapeError {
     }
 }
 
-/// Returns the arguments that may remedy a refused shape, in the words of the command line with the
-/// names of Python.
+/// Returns the arguments that may remedy a refused shape, in the words of the command line.
 fn advice(error: &ShapeError) -> Option<&'static str> {
     Some(match error {
         ShapeError::EmptyVolume | ShapeError::SolidVolume => {
             "check the grey values of the image; a grey image needs threshold=VALUE, \"otsu\" or \
              \"otsu3\""
+        }
+        ShapeError::MedianWithoutThreshold => {
+            "add threshold=\"otsu\" or a grey value, or omit median=True for an image of labels"
         }
         ShapeError::CutByBorder { .. } | ShapeError::CutByView { .. } => {
             "scan a larger region; if the crop is merely tight, pad=True includes the grain, \

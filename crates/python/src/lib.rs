@@ -2,7 +2,7 @@
 //! libraries and convert results; `python/grainwake` adds pandas, xarray and PyVista.
 //!
 //! Layers, downwards: `simulation`, `study`, `validation` -> `case` -> `running`, `case_dict` ->
-//! `grain`, `results` -> `arguments`, `arrays`, `threads` -> `error`.
+//! `grain`, `results` -> `arguments`, `arrays`, `threads` -> `error` -> `words`.
 
 mod arguments;
 mod arrays;
@@ -16,6 +16,7 @@ mod simulation;
 mod study;
 mod threads;
 mod validation;
+mod words;
 
 use pyo3::prelude::*;
 

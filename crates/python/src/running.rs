@@ -123,14 +123,22 @@ fn as_dict<'py>(py: Python<'py>, p: &Progress) -> PyResult<Bound<'py, PyDict>> {
     Ok(dict)
 }
 
-/// Finds the checkpoint that `text`, "DIR" or "DIR@TIME", names, and checks that the case can start
+/// Finds the checkpoint that `from`, "DIR" or "DIR@TIME", names, and checks that the case can start
 /// from it.
-pub fn parent(py: Python<'_>, case: &Case, text: &str) -> PyResult<Parent> {
+pub fn parent(py: Python<'_>, case: &Case, from: &Path) -> PyResult<Parent> {
+    let text = from
+        .to_str()
+        .ok_or_else(|| input(format!("start_from: {} is not UTF-8", from.display())))?;
     let mut notes = Vec::new();
     let found = find_parent(text, &mut |note| notes.push(note.to_owned())).raise()?;
     case.check_parent(&found).raise()?;
     warn(py, notes)?;
     Ok(found)
+}
+
+/// Refuses a value of the argument `progress` of another kind.
+pub fn check_progress(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    py.import("grainwake._progress")?.call_method1("check", (progress,)).map(drop)
 }
 
 /// Runs a case in a folder, from a checkpoint of the parent if there is one.
@@ -143,6 +151,7 @@ pub fn run(
     threads: usize,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Summary> {
+    check_progress(py, progress)?;
     let job = case.job_in(folder, existing).raise()?;
     let pool = threads::pool(threads)?;
     let (shared, stop) = (Mutex::new(Shared::default()), Arc::new(AtomicBool::new(false)));

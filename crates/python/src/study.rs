@@ -9,12 +9,12 @@ use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
     Options, Outcome, Plan, Selection, Study, StudyObserver, execute, records, write_tables,
 };
-use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
 use crate::arrays::json;
 use crate::case_dict::override_list;
-use crate::error::{Raise, input, numerics, refused};
+use crate::error::{Raise, input, numerics, refused, system, warn};
+use crate::running::check_progress;
 use crate::{running, threads};
 
 /// Study: the runs of a study file.
@@ -133,13 +133,14 @@ impl PyStudy {
         py: Python<'py>,
         folder: PathBuf,
         only: Option<&str>,
-        jobs: usize,
-        threads: usize,
+        #[pyo3(from_py_with = crate::arguments::jobs)] jobs: usize,
+        #[pyo3(from_py_with = crate::arguments::threads)] threads: usize,
         retry: bool,
         keep_checkpoints: bool,
         accept: Option<Vec<String>>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        check_progress(py, progress)?;
         let plan = self.plan.clone().accepting(&accept.unwrap_or_default());
         let plan = &plan.map_err(|problem| refused(&[problem]))?;
         let selection = only.map_or(Ok(Selection::All), Selection::parse);
@@ -182,6 +183,18 @@ impl PyStudy {
             None => failures(plan, &outcomes),
         }?;
         py.import("grainwake._studies")?.call_method1("open", (folder,))
+    }
+
+    #[staticmethod]
+    fn _from_json(plan: &str) -> PyResult<PyStudy> {
+        let plan = serde_json::from_str(plan).map_err(|error| input(error.to_string()))?;
+        Ok(PyStudy { plan })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let plan = serde_json::to_string(&slf.get().plan);
+        let plan = plan.map_err(|error| input(format!("the study cannot be pickled: {error}")))?;
+        Ok((slf.get_type().getattr("_from_json")?, (plan,)))
     }
 
     /// Title of the study, one line.
@@ -229,7 +242,7 @@ fn failures(plan: &Plan, ended: &[(usize, Outcome)]) -> PyResult<()> {
     Err(match worst {
         FailureKind::Input => input(message),
         FailureKind::Computation => numerics(message),
-        FailureKind::InputOutput => PyOSError::new_err(message),
+        FailureKind::InputOutput => system(std::io::ErrorKind::Other, message),
     })
 }
 
@@ -237,9 +250,7 @@ fn failures(plan: &Plan, ended: &[(usize, Outcome)]) -> PyResult<()> {
 #[pyfunction]
 pub fn _read_plan(py: Python<'_>, folder: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let (plan, damage) = Plan::read_or_rebuild(&folder).raise()?;
-    if let Some(note) = damage {
-        py.import("warnings")?.call_method1("warn", (note,))?;
-    }
+    warn(py, damage)?;
     json(py, &plan)
 }
 

@@ -20,7 +20,7 @@ pub fn _validate<'py>(
     suites: Option<PathBuf>,
     output: PathBuf,
     level: &str,
-    threads: usize,
+    #[pyo3(from_py_with = crate::arguments::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let level = match level {

@@ -1,5 +1,11 @@
 """Cases: construction, and the words of the command line for refused input."""
 
+import copy
+import pickle
+import re
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -19,6 +25,14 @@ BAD = {
 }
 
 
+# Options and commands in the messages of the command line, and their names in Python.
+PYTHON = {
+    "[--set:": "[overrides:",
+    "`grainwake schema`": "Case.schema()",
+    "`grainwake grain from-scan`, `from-mesh` or `make`": "Grain.save",
+}
+
+
 @pytest.mark.parametrize("name", BAD)
 def test_refused_cases_have_the_words_of_the_command_line(name, tmp_path, cli, monkeypatch):
     text, override = BAD[name]
@@ -28,6 +42,8 @@ def test_refused_cases_have_the_words_of_the_command_line(name, tmp_path, cli, m
     told = cli("check", "bad.toml", *settings, code=2, cwd=tmp_path).stderr
     with pytest.raises(gw.CaseError) as refused:
         gw.Case.load("bad.toml", [override] if override else None)
+    for phrase, other in PYTHON.items():
+        told = told.replace(phrase, other)
     assert str(refused.value).strip() == told.strip()
     assert refused.value.problems and refused.value.problems[0].message in told.replace("\n", " ")
 
@@ -92,6 +108,122 @@ def test_a_problem_of_a_dict_quotes_its_toml():
     assert 'cell_size = "0.1 kg"' in str(refused.value)
 
 
+def test_messages_name_arguments_of_python(case_file, run, tmp_path):
+    case = gw.Case.load(case_file)
+    keys = {"domain": {"size": [1, 1, 1], "cell_size": 0.1}, "time": {"end": 1}}
+    longer = gw.Case.load(case_file, {"time.end": "1 s"})
+    for call, words in [
+        (lambda: case.run(run.path, progress=False), "another folder, or replace it with force=True"),
+        (lambda: case.run(tmp_path / "new", resume=True, progress=False),
+         "leave out resume=True, or give the run folder"),
+        (lambda: longer.run(tmp_path / "new", start_from=tmp_path, progress=False),
+         'for example start_from="runs/heap" or, with the time of the checkpoint, start_from="runs'),
+        (lambda: longer.run(tmp_path / "new", start_from="x@1 kg", progress=False),
+         "start_from=x@1 kg: "),
+        (lambda: gw.Case.load(case_file, ["time.end"]),
+         'override time.end: there is no `=`.*write "key=value", for example "time.end=0.5" or'),
+        (lambda: gw.Case.load(case_file, {"time.speed": None}), "None for time.speed: the case has"),
+        (lambda: gw.Case.load(case_file, {"time.ends": 1}), r"\[overrides:1:6\]"),
+        (lambda: gw.Case.from_dict({**keys, "grain": {"density": 1}}),
+         "give a list of dicts for `grain`"),
+        (lambda: gw.Case.from_dict({**keys, "fluid": [{"density": 1}]}), "give one dict for `fluid`"),
+        (lambda: gw.Case.from_dict(keys), "add `fluid` or `grain`"),
+        (lambda: gw.Case.from_dict({**keys, "grain": [
+            {"file": "none.grain", "density": 1, "position": [0.5, 0.5, 0.5]}]}),
+         "paths are relative to `folder`; make a grain file with Grain.save"),
+    ]:
+        with pytest.raises(gw.CaseError, match=f"(?s){words}") as refused:
+            call()
+        # The text of a dict is quoted as TOML.
+        for problem in refused.value.problems:
+            words = f"{problem.message} {problem.help} {problem.file}"
+            assert not re.search(r"--[a-z]|\[\[|`grainwake", words), words
+
+
+def test_every_option_in_a_message_of_the_libraries_has_a_python_name(root):
+    """Options in string literals of the libraries, except in comments and tests."""
+    known = (root / "crates/python/src/words.rs").read_text()
+    missing = {}
+    for library in ("formats", "report", "run", "shape", "solver", "study", "validation"):
+        for file in (root / "crates" / library / "src").rglob("*.rs"):
+            code = file.read_text().split("#[cfg(test)]")[0]
+            lines = [line for line in code.splitlines() if not line.lstrip().startswith("//")]
+            for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", "\n".join(lines)):
+                if file.name != "tests.rs" and option not in known:
+                    missing[option] = str(file.relative_to(root))
+    assert not missing
+
+
+def pebbles(folder):
+    """Case with grain files of two folders, whose order differs from that of their names."""
+    for name, axis in (("b/one", "1.5 mm"), ("a/two", "1.4 mm")):
+        file = folder / f"{name}.grain"
+        file.parent.mkdir(parents=True)
+        gw.Grain.ellipsoid(axis, "1.2 mm", "1 mm", cells=24).save(file)
+    text = """
+title = "Two pebbles"
+[fluid]
+density = 1000
+viscosity = "1 mPa s"
+[domain]
+size = ["4 mm", "4 mm", "8 mm"]
+cell_size = "0.25 mm"
+[[grain]]
+file = "b/one.grain"
+density = 2000
+position = ["2 mm", "2 mm", "6 mm"]
+[[grain]]
+file = "a/two.grain"
+density = 2500
+gap_above = { grain = 0, gap = "0.1 mm" }
+[time]
+end = "1 s"
+stop = "landing"
+"""
+    (folder / "case.toml").write_text(text)
+    return gw.Case.load(folder / "case.toml", {"time.end": "10 ms"})
+
+
+def test_a_case_survives_pickling_without_its_files(tmp_path):
+    case = pebbles(tmp_path)
+    content = pickle.dumps(case)
+    for name in ("case.toml", "b/one.grain", "a/two.grain"):
+        (tmp_path / name).unlink()
+    for again in (pickle.loads(content), copy.deepcopy(case)):
+        assert again.digest == case.digest and again.resolved == case.resolved
+        assert again.grains == case.grains and again.warnings == case.warnings
+        assert (again.title, again.end, again.cells) == (case.title, 0.01, case.cells)
+        assert again.estimate(1) == case.estimate(1)
+    before, after = gw.Simulation(case), gw.Simulation(pickle.loads(content))
+    for sim in (before, after):
+        sim.advance_to("2 ms")
+    assert (before.positions == after.positions).all() and before.steps == after.steps
+
+
+def test_a_case_goes_to_a_process_of_its_own(case, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("""
+import multiprocessing
+import pickle
+import sys
+import grainwake as gw
+
+def speed(case):
+    sim = gw.Simulation(case, threads=1)
+    sim.advance_to("2 ms")
+    return sim.velocities[0, 2]
+
+if __name__ == "__main__":
+    case = pickle.load(sys.stdin.buffer)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        print(pool.map(speed, [case])[0] == speed(case) < 0)
+""")
+    done = subprocess.run(
+        [sys.executable, script], input=pickle.dumps(case), capture_output=True, check=True
+    )
+    assert done.stdout.split() == [b"True"]
+
+
 def endless():
     tables = {}
     tables["time"] = tables
@@ -115,6 +247,11 @@ class Twin:
 def test_a_value_without_toml_is_refused(tables, words):
     with pytest.raises(gw.CaseError, match=words):
         gw.Case.from_dict(tables)
+
+
+def test_a_refinement_is_a_whole_number():
+    with pytest.raises(gw.CaseError, match="refinement: found -1; expected a whole number from 1"):
+        gw.Case.new(size=["4 mm"] * 3, cell_size="1 mm", end="1 s", refinement=-1)
 
 
 def test_a_table_that_is_no_dict_is_refused():

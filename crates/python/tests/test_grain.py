@@ -42,7 +42,8 @@ def test_units_are_numbers_in_si_or_strings():
     (float("nan"), ["found NaN"]),
     ([1], ["found a value of type list"]),
     (True, ["found a value of type bool"]),
-    (-1.0, ["must be finite and positive"]),
+    (-1e-3, ["diameter = -0.001", "must be finite and positive"]),
+    (1e-10, ["diameter = 1e-10", "a length must lie between"]),
 ])
 def test_a_wrong_length_is_refused(value, words):
     with pytest.raises(gw.CaseError) as refused:
@@ -57,8 +58,35 @@ def test_closed_forms_have_their_extents():
     assert box.roundness == pytest.approx(0.4, abs=0.1)
     assert gw.Grain.cylinder("1 mm", "2 mm", cells=32).a == pytest.approx(2e-3, rel=0.02)
     assert gw.Grain.capsule("1 mm", "1 mm", cells=32).a == pytest.approx(2e-3, rel=0.02)
-    quadric = gw.Grain.superquadric("2 mm", "2 mm", "2 mm", exponents=(1, 1), cells=32)
-    assert quadric.wadell_sphericity == pytest.approx(1, abs=0.01)
+    for exponents in ((1, 1), [1, 1], np.array([1.0, 1.0])):
+        quadric = gw.Grain.superquadric("2 mm", "2 mm", "2 mm", exponents=exponents, cells=32)
+        assert quadric.wadell_sphericity == pytest.approx(1, abs=0.01)
+    for exponents in ((1, 1, 1), 1, "ab"):
+        with pytest.raises(gw.CaseError, match="exponents: found .*; expected 2 numbers"):
+            gw.Grain.superquadric("2 mm", "2 mm", "2 mm", exponents=exponents)
+
+
+@pytest.mark.parametrize("make", [
+    lambda: gw.Grain.sphere(2),
+    lambda: gw.Grain.ellipsoid(3, 2, 2, cells=24),
+    lambda: gw.Grain.rounded_box(2, 2, 1, radius=0.2, cells=24),
+    lambda: gw.Grain.cylinder(1, 2, cells=24),
+    lambda: gw.Grain.capsule("0.5 um", "0.5 um", cells=24),
+    lambda: gw.Grain.superquadric(2, 2, 2, exponents=(1, 1), cells=24),
+])
+def test_a_closed_form_of_implausible_size_is_refused(make, tmp_path, cli):
+    with pytest.raises(gw.CaseError) as refused:
+        make()
+    message = refused.value.problems[0].message
+    assert "the grain has an equivalent diameter of" in message
+    assert message.endswith("accepted are 1 um to 1 m")
+    assert 'a string has its unit, such as "2 mm"' in refused.value.problems[0].help
+    told = cli("grain", "make", "sphere", "2", "-o", tmp_path / "x.grain", code=2).stderr
+    assert "the grain has an equivalent diameter of 2 m; accepted are 1 um to 1 m" in told
+
+
+def test_a_grain_of_any_size_is_made_by_scaling():
+    assert gw.Grain.sphere(1).scaled(2).equivalent_diameter == pytest.approx(2)
 
 
 def test_a_family_grain_has_its_targets():
@@ -127,7 +155,7 @@ def test_a_bad_mesh_is_refused(mesh, words):
 
 
 def test_a_wrong_unit_is_noticed():
-    with pytest.raises(gw.CaseError, match="accepted are 1 um to 1 m; check unit"):
+    with pytest.raises(gw.CaseError, match="(?s)accepted are 1 um to 1 m.*check unit"):
         gw.Grain.from_mesh((CUBE_VERTICES, CUBE_FACES), unit="km", cells=16)
     with pytest.raises(gw.CaseError, match="unit: it is missing"):
         gw.Grain.from_mesh("cube.stl")
@@ -159,13 +187,40 @@ def test_meshes_go_to_trimesh_and_back():
     assert gw.Grain.from_mesh(box, cells=32).volume == pytest.approx(2e-9, rel=0.02)
 
 
-def test_counts_are_whole_numbers_from_0_on():
-    with pytest.raises(gw.CaseError, match="found -5; expected a whole number from 0 on"):
-        gw.Grain.sphere("1 mm", nodes=-5)
-    with pytest.raises(gw.CaseError, match="found -1; expected a whole number from 0 on"):
-        gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=-1)
+def test_counts_are_whole_numbers():
+    grain = gw.Grain.sphere("1 mm", nodes=np.int64(100))
+    assert len(grain.nodes) == 100
+    for call, words in [
+        (lambda: gw.Grain.sphere("1 mm", nodes=-5), "nodes: found -5; expected a whole number from 1"),
+        (lambda: gw.Grain.sphere("1 mm", nodes=0), "nodes: found 0; expected a whole number from 1"),
+        (lambda: gw.Grain.sphere("1 mm", nodes=2**200), f"nodes: {2**200} is too large"),
+        (lambda: gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=-1), "cells: found -1; expected a"),
+        (lambda: gw.Grain.family(0.7, 0.4, seed=-1), "seed: found -1; expected a whole number from 0"),
+        (lambda: gw.Grain.family(0.7, 0.4, cells=-1), "cells: found -1"),
+        (lambda: gw.scan(ball(), voxel="50 um", label=-1), "label: found -1"),
+        (lambda: gw.scan(ball(), voxel="50 um", label=2**32), "label: 4294967296 is too large"),
+        (lambda: grain.picture(-1), "pixels: found -1; expected a whole number from 16 on"),
+        (lambda: grain.picture(pixels=10**5), "pixels: found 100000; expected 16 to 4096"),
+    ]:
+        with pytest.raises(gw.CaseError, match=words):
+            call()
     with pytest.raises(TypeError):
         gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=20.5)
+
+
+def test_an_entry_has_one_shape():
+    sphere = gw.Grain.sphere("2 mm")
+    for key in ("file", "shape"):
+        with pytest.raises(gw.CaseError, match=f"{key}: the grain itself is the shape"):
+            sphere.at([0, 0, 0], density=2500, **{key: "x"})
+    assert sphere.at([0, 0, 0], density=2500, motion="fixed")["file"] is sphere
+
+
+def test_arrays_of_a_grain_are_read_only():
+    grain = gw.Grain.sphere("2 mm")
+    for array in (grain.nodes, grain.node_areas, grain.inertia):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 9
 
 
 def test_a_scan_of_an_array_becomes_a_grain():
@@ -205,7 +260,8 @@ def test_a_scan_of_several_grains():
         with pytest.raises(KeyError, match=f"label {label}"):
             scan[label]
     assert list(scan) == [4, 7] and 7 in scan and 9 not in scan and "x" not in scan
-    with pytest.raises(gw.CaseError, match="cells = 0"):
+    assert scan[np.int64(7)] == scan[7]
+    with pytest.raises(gw.CaseError, match="cells: found 0; expected a whole number from 1 on"):
         gw.scan(image, voxel="0.1 mm", cells=0)
     with pytest.raises(gw.CaseError, match="holds 3 grains"):
         gw.Grain.from_scan(image, voxel="0.1 mm", roundness=False)
@@ -221,6 +277,20 @@ def test_grey_images_need_a_threshold():
     assert 1 < scan.threshold < 3 and len(scan) == 1
     with pytest.raises(gw.CaseError, match='found "mean"'):
         gw.scan(image, voxel="50 um", threshold="mean")
+
+
+def test_a_median_needs_a_threshold(tmp_path, cli):
+    labels = ball().astype(np.uint8)
+    for read in (gw.scan, gw.Grain.from_scan):
+        with pytest.raises(gw.CaseError) as refused:
+            read(labels, voxel="50 um", median=True)
+        problem = refused.value.problems[0]
+        assert problem.message.startswith("the median filters grey values before the threshold")
+        assert 'add threshold="otsu" or a grey value, or omit median=True' in problem.help
+    np.save(tmp_path / "ball.npy", labels)
+    told = cli("grain", "from-scan", tmp_path / "ball.npy", "--voxel", "50 um", "--median",
+               "-o", tmp_path / "x.grain", code=2).stderr
+    assert problem.message in told and "add --threshold otsu" in told
 
 
 def test_voxels_without_a_value_are_refused():

@@ -2,8 +2,10 @@
 
 import doctest
 import pathlib
+import re
 import subprocess
 import sys
+import warnings
 
 import pytest
 
@@ -36,31 +38,49 @@ def test_examples_of_docstrings_run(name):
         assert doctest.DocTestRunner().run(test).failed == 0
 
 
-def test_types_of_a_program_are_checked(tmp_path):
+def test_types_of_a_script_are_checked(tmp_path):
     pytest.importorskip("mypy")
-    program = tmp_path / "program.py"
-    program.write_text("""
+    script = tmp_path / "script.py"
+    script.write_text("""
+import pathlib
+import numpy as np
 import grainwake as gw
 
 grain = gw.Grain.sphere("1 mm")
 case = gw.Case.from_dict({"grain": [grain.at([0, 0, 0], density=2500)]})
-run = case.run("out")
-if isinstance(run, gw.RunFolder):
-    reveal_type(run.notes)
-for state in gw.Simulation(case).run(every="1 ms"):
+run = case.run("out", start_from=pathlib.Path("runs/x"))
+reveal_type(run.notes)
+reveal_type(gw.open_run("out").grain(np.int64(0)))
+reveal_type(gw.open_study("out").runs)
+gw.Grain.superquadric(1, 1, 1, exponents=[1, 1], nodes=np.int64(9))
+sim = gw.Simulation(case)
+for index in np.arange(2):
+    sim.set_load(index, force=sim.forces[index])
+for state in sim.run(every="1 ms"):
     reveal_type(state.time)
 gw.Grain.sphere()
 case.rum("out")
 """)
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", str(program)],
+        [sys.executable, "-m", "mypy", "--strict", str(script)],
         capture_output=True, text=True, cwd=tmp_path,
     )
-    assert 'Revealed type is "list[str]"' in done.stdout.replace("builtins.", ""), done.stdout
-    assert 'Revealed type is "float"' in done.stdout.replace("builtins.", "")
+    revealed = done.stdout.replace("builtins.", "")
+    assert revealed.count('Revealed type is "list[str]"') == 2, done.stdout
+    assert 'Revealed type is "pandas.core.frame.DataFrame"' in revealed, done.stdout
+    assert 'Revealed type is "float"' in revealed
     assert 'Missing positional argument "diameter"' in done.stdout
     assert '"Case" has no attribute "rum"' in done.stdout
     assert "Found 2 errors" in done.stdout, done.stdout
+
+
+def test_the_first_example_of_the_manual_has_no_warning(root, capsys):
+    page = (root / "docs" / "python.md").read_text()
+    example = re.search(r"```python\n(.*?)```", page, re.DOTALL).group(1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        exec(example, {})
+    assert "vertical velocity" in capsys.readouterr().out
 
 
 def test_the_import_loads_no_optional_package():

@@ -57,7 +57,9 @@ def test_control_shows_in_the_tables(case, run, tmp_path):
     assert np.array_equal(in_memory["vz"], table["vz"].iloc[5:])
     # The simulation is closed, but can still be read.
     assert sim.time == pytest.approx(0.02) and sim.output == tmp_path / "run"
-    for call in (sim.step, sim.checkpoint, sim.finish):
+    for call in (sim.step, sim.checkpoint, sim.finish, lambda: sim.set_load(0),
+                 lambda: sim.set_velocity(0, [0, 0, 0]),
+                 lambda: sim.prescribe_motion(0, [0, 0, 0]), lambda: sim.release(0)):
         with pytest.raises(gw.CaseError, match="the run folder is closed: continue it with"):
             call()
 
@@ -156,6 +158,32 @@ def test_nothing_is_stepped_beyond_the_end_of_the_case(case, tmp_path):
     assert len(gw.open(tmp_path / "run").grains) == 11
 
 
+def test_walls_have_the_numbers_of_the_table(tmp_path):
+    case = gw.Case.new(
+        size=["4 mm", "4 mm", "4 mm"],
+        cell_size="0.25 mm",
+        grains=[gw.Grain.sphere("1 mm").at(["3.499 mm", "0.501 mm", "2 mm"], density=2500,
+                                           velocity=[0.1, -0.1, 0])],
+        gravity=[0, 0, 0],
+        end="1 ms",
+        time={"step": "1 us"},
+        output={"contacts": "10 us"},
+    )
+    seen = {}
+    with gw.Simulation(case, output=tmp_path / "run") as sim:
+        while not sim.ended:
+            sim.step()
+            contacts = sim.contacts()
+            acting = contacts["partner"][contacts["overlap"] > 0]
+            if len(acting):
+                seen[round(sim.time, 7)] = acting.tolist()
+    # Upper x and lower y.
+    table = gw.open_run(tmp_path / "run").contacts
+    assert set(table["partner"]) == {-2, -3}
+    for time, rows in table.groupby("time"):
+        assert rows["partner"].tolist() == seen[round(time, 7)]
+
+
 def test_arrays_of_fields_do_not_hold_up_the_end(case, tmp_path):
     with gw.Simulation(case, output=tmp_path / "run") as sim:
         sim.step()
@@ -213,7 +241,7 @@ def test_a_stop_condition_ends_a_run_as_it_does_in_case_run(case_file, tmp_path)
         assert each.ended is None
         last = list(each.run(progress=False))[-1]
         assert each.ended == "landing" and 0.001 <= last.time - landing < 0.002
-        # `run` has nothing left to do, a step of the program is still possible.
+        # `run` has nothing left to do, a step of the script is still possible.
         assert [state.time for state in each.run(progress=False)] == [last.time]
         each.step()
         assert each.time > last.time

@@ -1,6 +1,7 @@
 """Run folders: bits of the command line, tables, slices, surfaces, damage."""
 
 import json
+import pickle
 import shutil
 import signal
 import sys
@@ -46,6 +47,7 @@ def test_tables_are_frames(run):
     assert run.by_grain()["z", 0].iloc[0] == pytest.approx(6e-3)
     assert run.diagnostics["step"].dtype == "int64"
     assert list(run.events.columns) == ["time", "event", "grains", "confirmed", "gap", "tilt", "wall"]
+    assert run.grain(np.int64(0)).equals(one)
     with pytest.raises(IndexError, match="there is no grain 1"):
         run.grain(1)
 
@@ -156,8 +158,13 @@ def test_the_report_is_drawn_again(run):
 def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(gw.CaseError, match="holds no run"):
         gw.open(tmp_path)
-    with pytest.raises(FileNotFoundError, match="there is no folder"):
-        gw.open(tmp_path / "none")
+    with pytest.raises(gw.CaseError, match="holds no run"):
+        gw.open_run(tmp_path)
+    with pytest.raises(gw.CaseError, match="holds no study; a run is opened with open_run"):
+        gw.open_study(tmp_path)
+    for opened in (gw.open, gw.open_run, gw.open_study):
+        with pytest.raises(FileNotFoundError, match="there is no folder"):
+            opened(tmp_path / "none")
 
 
 @pytest.fixture
@@ -309,6 +316,16 @@ values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}
     seen = []
     results = study.run(tmp_path / "study", progress=seen.append)
     assert seen[-1]["done"] == 2
+    for wrong, words in [({"jobs": -1}, "jobs: found -1; expected a whole number from 1 on"),
+                         ({"jobs": 0}, "jobs: found 0; expected a whole number from 1 on"),
+                         ({"threads": -1}, "threads: found -1; expected a whole number from 0 on"),
+                         ({"progress": 3}, "progress: found a value of type int"),
+                         ({"only": "none*"}, 'only: no run is called "none')]:
+        with pytest.raises(gw.CaseError, match=words):
+            study.run(tmp_path / "other", **wrong)
+    assert not (tmp_path / "other").exists()
+    again = pickle.loads(pickle.dumps(study))
+    assert again.plan() == study.plan() and again.title == study.title
     with pytest.raises(gw.CaseError, match="900fc4e"):
         study.run(tmp_path / "study", accept=["900fc4e"], progress=False)
     assert results.runs == study.runs
@@ -318,7 +335,10 @@ values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}
     assert results.run(heavy).grain(0)["vz"].iloc[-1] < -0.03
     assert len(results.records) == 2
     assert results.report().is_file()
-    assert isinstance(gw.open(tmp_path / "study"), gw.StudyFolder)
+    for opened in (gw.open, gw.open_study):
+        assert isinstance(opened(tmp_path / "study"), gw.StudyFolder)
+    with pytest.raises(gw.CaseError, match="holds a study, not a run; open it with open_study"):
+        gw.open_run(tmp_path / "study")
     with pytest.raises(KeyError, match="there is no run 'x'"):
         results.run("x")
     study_file.write_text("title = 1\n")
@@ -365,9 +385,20 @@ def test_the_validations_in_the_package_need_no_source_tree(tmp_path, monkeypatc
 
 def test_a_run_starts_from_a_checkpoint_of_another_run(case_file, run, tmp_path):
     longer = gw.Case.load(case_file, {"time.end": "0.2 s"})
-    branch = longer.run(tmp_path / "branch", start_from=str(run.path), progress=False, report=False)
+    branch = longer.run(tmp_path / "branch", start_from=run.path, progress=False, report=False)
     parent = branch.provenance["parent"]
     assert parent["case_sha256"] == run.provenance["case_sha256"]
     assert branch.grains["time"].iloc[0] == parent["checkpoint_time"] == run.grains["time"].iloc[-1]
+    at = f"{run.path}@10 s"
+    timed = longer.run(tmp_path / "timed", start_from=at, progress=False, report=False)
+    assert timed.provenance["parent"] == parent
     with pytest.raises(gw.CaseError, match="later end"):
         gw.Case.load(case_file).run(tmp_path / "same", start_from=str(run.path), progress=False)
+
+
+def test_progress_is_a_bool_or_a_callable(case, tmp_path):
+    for wrong in (3, "yes", 0):
+        with pytest.raises(gw.CaseError, match="progress: found a value of type .*expected True"):
+            case.run(tmp_path / "run", progress=wrong)
+    assert not (tmp_path / "run").exists()
+    case.run(tmp_path / "run", progress=np.bool_(False), report=False)

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import types
+import warnings
 
 import numpy as np
 import pytest
@@ -72,9 +73,31 @@ def test_steps_and_times_are_checked(sim):
         (lambda: sim.step(horizon=0), "expected a positive time"),
         (lambda: sim.advance_to("2 mm"), "is a length"),
         (lambda: sim.run(every=-1), "expected a positive time"),
+        (lambda: sim.run(until=-1), "until: found -1 s, which is before the present time"),
+        (lambda: sim.run(until=0.5 * sim.time), "which is before the present time"),
+        (lambda: sim.run(progress=3), "progress: found a value of type int; expected True, False"),
     ]:
         with pytest.raises(gw.CaseError, match=words):
             call()
+
+
+def test_a_run_may_end_at_the_present_time(sim):
+    sim.advance_to("1 ms")
+    assert [state.time for state in sim.run(until="1 ms", progress=False)] == [sim.time]
+
+
+def test_copies_of_the_state_are_read_only(sim):
+    sim.advance_to("1 ms")
+    names = ("positions", "orientations", "velocities", "angular_velocities", "forces", "torques",
+             "masses")
+    state = sim.state()
+    arrays = [getattr(sim, name) for name in names] + list(sim.contacts().values())
+    arrays += [getattr(state, name) for name in names[:-1]]
+    for array in arrays:
+        assert not array.flags.writeable
+    with pytest.raises(ValueError, match="read-only"):
+        sim.positions[0, 0] = 9
+    assert sim.positions.copy().flags.writeable
 
 
 def test_the_bits_do_not_depend_on_threads_and_on_python(case):
@@ -261,11 +284,30 @@ def test_wrong_control_is_refused(sim):
     sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
 
 
+def test_grains_have_indices_of_numpy(sim):
+    sim.set_load(np.int64(0), force=[0, 0, "1 uN"])
+    sim.prescribe_motion(np.uint8(0), [0, 0, 0])
+    sim.release(np.int32(0))
+
+
+def test_a_simulation_gives_the_warnings_of_its_case(case_file, tmp_path):
+    coarse = gw.Case.load(case_file, {"domain.cell_size": "0.5 mm", "time.end": "1 ms"})
+    assert coarse.warnings
+    for more in ({}, {"output": tmp_path / "run"}):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            sim = gw.Simulation(coarse, threads=1, **more)
+            list(sim.run(progress=False))
+        assert [str(each.message) for each in caught] == coarse.warnings
+        assert all(each.category is gw.CaseWarning for each in caught)
+        assert all(each.filename == __file__ for each in caught)
+
+
 def test_too_many_threads_are_reduced(case):
     with pytest.warns(gw.CaseWarning, match="1000000 threads are too many"):
         sim = gw.Simulation(case, threads=1_000_000)
     assert sim.threads <= 4 * os.cpu_count()
-    with pytest.raises(gw.CaseError, match="found -1; expected a whole number"):
+    with pytest.raises(gw.CaseError, match="threads: found -1; expected a whole number from 0 on"):
         gw.Simulation(case, threads=-1)
 
 
@@ -285,7 +327,8 @@ def test_contacts_are_listed():
         assert sim.steps < 200
         sim.step()
         contacts = sim.contacts()
-    assert contacts["grain"].tolist() == [0] and contacts["partner"].tolist() == [-1]
+    # The lower side along z, as in contacts.csv.
+    assert contacts["grain"].tolist() == [0] and contacts["partner"].tolist() == [-5]
     assert contacts["overlap"][0] > 0 and contacts["force"][0, 2] > 0
     assert contacts["point"][0] == pytest.approx([2e-3, 2e-3, 0], abs=2e-5)
 
@@ -320,6 +363,107 @@ def test_a_checkpoint_restores_the_bits(case, tmp_path):
         gw.Simulation(dry()).restore_checkpoint(file)
     with pytest.raises(FileNotFoundError):
         other.restore_checkpoint(tmp_path / "none")
+
+
+def test_a_restored_state_has_no_control(case, tmp_path):
+    file = tmp_path / "state.ckpt"
+    sim = gw.Simulation(case)
+    sim.advance_to("2 ms")
+    sim.save_checkpoint(file)
+    sim.advance_to("4 ms")
+    free = sim.state()
+    for control in (
+        lambda: sim.set_load(0, force=[0, 0, "100 uN"], torque=["1 nN m", 0, 0]),
+        lambda: sim.prescribe_motion(0, velocity=[0, 0, 0]),
+        lambda: sim.prescribe_motion(0, angular_velocity=[0, 0, 1]),
+    ):
+        control()
+        sim.advance_to(sim.time + 1e-3)
+        sim.restore_checkpoint(file)
+        sim.advance_to("4 ms")
+        assert sim.steps == free.steps
+        for name in ("positions", "velocities", "angular_velocities", "forces"):
+            assert (getattr(sim, name) == getattr(free, name)).all(), name
+
+
+def test_a_restored_state_has_the_motions_of_its_case(tmp_path):
+    """A formula that was replaced from Python, and a grain that has left since."""
+    rising = dry(motion={"velocity": {"formula": ["0", "0", "0.1 * t"]}})
+    sim = gw.Simulation(rising)
+    sim.save_checkpoint(tmp_path / "state.ckpt")
+    sim.advance_to("4 ms")
+    z = sim.positions[0, 2]
+    sim.release(0)
+    sim.restore_checkpoint(tmp_path / "state.ckpt")
+    sim.advance_to("4 ms")
+    assert sim.positions[0, 2] == z > 6e-3
+
+    leaving = gw.Case.new(
+        size=["3 mm", "3 mm", "4 mm"], cell_size="0.25 mm", end="0.1 s",
+        fluid={"density": 1000, "viscosity": "1 mPa s"},
+        grains=[gw.Grain.sphere("1 mm").at(["1.5 mm", "1.5 mm", "1 mm"], density=2500,
+                                           velocity=[0, 0, -0.2])],
+        boundaries={"z": ["outflow", "wall"]},
+    )
+    sim = gw.Simulation(leaving)
+    sim.advance_to("1 ms")
+    sim.save_checkpoint(tmp_path / "state.ckpt")
+    sim.advance_to("2 ms")
+    at = sim.positions
+    sim.advance_to("0.1 s")
+    assert np.isinf(sim.positions).all()
+    sim.restore_checkpoint(tmp_path / "state.ckpt")
+    sim.advance_to("2 ms")
+    assert (sim.positions == at).all()
+
+
+def test_a_failed_simulation_continues_from_a_checkpoint(case_file, tmp_path):
+    file = tmp_path / "state.ckpt"
+    case = gw.Case.load(case_file, {"time.step": "0.5 ms", "time.end": "1 s"})
+    sim = gw.Simulation(case)
+    sim.advance_to("2 ms")
+    sim.save_checkpoint(file)
+    sim.advance_to("4 ms")
+    good = sim.state()
+    sim.set_velocity(0, velocity=[0, 0, -10])
+    with pytest.raises(gw.SolverError, match="became unstable"):
+        sim.advance_to("1 s")
+    with pytest.raises(gw.SolverError, match="cannot be continued"):
+        sim.set_load(0)
+    (tmp_path / "bad.ckpt").write_bytes(b"short")
+    with pytest.raises(gw.CaseError, match="cut off"):
+        sim.restore_checkpoint(tmp_path / "bad.ckpt")
+    with pytest.raises(gw.SolverError, match="cannot be continued"):
+        sim.step()
+    sim.restore_checkpoint(file)
+    sim.advance_to("4 ms")
+    assert sim.steps == good.steps
+    for name in ("positions", "velocities", "forces", "torques"):
+        assert (getattr(sim, name) == getattr(good, name)).all(), name
+
+
+def test_a_restored_simulation_has_the_stop_condition_of_its_case(case_file, tmp_path):
+    """The checkpoint of a case without a stop condition has no state of the events."""
+    low = {"time.end": "1 s", "grain.0.position": ["2 mm", "2 mm", "1 mm"]}
+    plain = gw.Simulation(gw.Case.load(case_file, low))
+    plain.save_checkpoint(tmp_path / "state.ckpt")
+    sim = gw.Simulation(gw.Case.load(case_file, {**low, "time.stop": "landing"}))
+    last = list(sim.run(progress=False))[-1]
+    assert sim.ended == "landing"
+    sim.restore_checkpoint(tmp_path / "state.ckpt")
+    sim.prescribe_motion(0, velocity=[0, 0, "10 mm/s"])
+    sim.advance_to(last.time + 1e-3)
+    assert sim.ended is None
+
+
+def test_a_state_is_not_restored_under_an_array(sim, tmp_path):
+    sim.step()
+    sim.save_checkpoint(tmp_path / "state.ckpt")
+    shown = sim.fluid_velocity("z")
+    before = shown.copy()
+    with pytest.raises(BufferError, match="1 array still shows"):
+        sim.restore_checkpoint(tmp_path / "state.ckpt")
+    assert (shown == before).all()
 
 
 def test_failed_numerics_raise_solver_error(case_file):
@@ -363,11 +507,67 @@ def test_another_thread_cannot_step_at_the_same_time(case_file):
         try:
             sim.step()
         except RuntimeError as error:
-            refused += "borrowed" in str(error)
+            refused += "only one thread may use a simulation at a time" in str(error)
         time.sleep(0.01)
     running.join()
     assert refused > 0
     assert sim.time >= 0.02 * (1 - 1e-9)
+
+
+def test_all_of_a_simulation_is_refused_to_another_thread(case_file, tmp_path):
+    sim = gw.Simulation(gw.Case.load(case_file, {"time.step": "20 us", "time.end": "1000 s"}))
+    stop = threading.Event()
+    entered = threading.Event()
+
+    def advance():
+        while not stop.is_set():
+            entered.set()
+            sim.advance_to(sim.time + 0.2)
+
+    uses = {
+        "step": sim.step, "advance_to": lambda: sim.advance_to("1 s"),
+        "run": lambda: next(sim.run(progress=False)), "state": sim.state, "repr": lambda: repr(sim),
+        "diagnostics": sim.diagnostics, "contacts": sim.contacts,
+        "set_velocity": lambda: sim.set_velocity(0, [0, 0, 0]),
+        "prescribe_motion": lambda: sim.prescribe_motion(0, [0, 0, 0]),
+        "release": lambda: sim.release(0), "set_load": lambda: sim.set_load(0),
+        "save_checkpoint": lambda: sim.save_checkpoint(tmp_path / "state"),
+        "restore_checkpoint": lambda: sim.restore_checkpoint(tmp_path / "state"),
+        "fluid_velocity": lambda: sim.fluid_velocity("z"),
+        "kinematic_pressure": sim.kinematic_pressure,
+        "cell_field": lambda: sim.cell_field("pressure"), "coordinates": sim.coordinates,
+        "interpolate_velocity": lambda: sim.interpolate_velocity([0, 0, 0]),
+        "to_xarray": sim.to_xarray, "checkpoint": sim.checkpoint, "finish": sim.finish,
+        "__exit__": lambda: sim.__exit__(None, None, None), "_advance": lambda: sim._advance(1.0),
+    }
+    attributes = [name for name, member in vars(gw.Simulation).items()
+                  if isinstance(member, types.GetSetDescriptorType)]
+    uses.update({name: lambda name=name: getattr(sim, name) for name in attributes})
+    methods = {name for name, member in vars(gw.Simulation).items() if callable(member)}
+    assert methods - set(uses) <= {"__new__", "__enter__", "__repr__", "__doc__"}
+    assert len(attributes) > 10
+
+    running = threading.Thread(target=advance)
+    running.start()
+    try:
+        entered.wait()
+        for name, use in uses.items():
+            # Between two calls of the other thread the simulation is free for a moment.
+            for attempt in range(100):
+                try:
+                    use()
+                except RuntimeError as error:
+                    assert type(error) is RuntimeError, (name, error)
+                    assert "in use by another call" in str(error), (name, error)
+                    break
+                except (gw.CaseError, FileNotFoundError):
+                    pass
+                time.sleep(0.001)
+            else:
+                pytest.fail(f"{name} was never refused")
+    finally:
+        stop.set()
+        running.join()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals of this kind")

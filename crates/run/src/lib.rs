@@ -6,12 +6,13 @@
 //!
 //! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
 //! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `memory`, `meter`,
-//! `queue`, `threads`, `plan`, `error`, `number_format`.
+//! `queue`, `threads`, `plan`, `error`, `grain_size` -> `number_format`.
 
 pub mod case;
 mod contact_events;
 mod contact_work;
 mod error;
+mod grain_size;
 mod job;
 mod memory;
 mod meter;
@@ -28,6 +29,7 @@ pub mod threads;
 mod watch;
 
 pub use error::{FailureKind, RunError};
+pub use grain_size::check_grain_size;
 pub use job::{Job, Options};
 pub use memory::admit_memory;
 pub use plan::{Plane, PlanePosition, Probe, ProbePlace, RunPlan, Stop};

@@ -1,7 +1,7 @@
 //! Assembly of a shape from a distance function in the principal frame.
 
 use crate::distance::Distance;
-use crate::error::{Defect, Result, ShapeError, positive, size, within};
+use crate::error::{Defect, Result, ShapeError, check_length, positive, within};
 use crate::field::{SAMPLES, SampledField};
 use crate::morphology::Morphology;
 use crate::nodes::SurfaceNode;
@@ -80,7 +80,7 @@ impl ShapeOptions {
         self.check()?;
         let cells = self.cells.unwrap_or(DEFAULT_CELLS);
         positive("shortest extent of the body", extent.min_element())?;
-        size("longest extent of the body", extent.max_element())?;
+        check_length("longest extent of the body", extent.max_element())?;
         Ok((extent.max_element() / cells as f64).min(self.thinnest_spacing(extent)))
     }
 

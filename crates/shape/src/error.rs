@@ -56,6 +56,9 @@ pub enum ShapeError {
         "the volume holds no solid voxel: all values are background (zero, or below the threshold)"
     )]
     EmptyVolume,
+    /// A median is asked for, and there is no threshold after it.
+    #[error("the median filters grey values before the threshold, and there is no threshold")]
+    MedianWithoutThreshold,
     /// The volume holds no background voxel.
     #[error("the volume is solid throughout: it has no background voxel, so no surface")]
     SolidVolume,
@@ -217,7 +220,10 @@ pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64> {
 const SIZES: RangeInclusive<f64> = 1e-9..=1e6;
 
 /// Refuses a length that no grain has [m].
-pub(crate) fn size(name: &'static str, value: f64) -> Result<()> {
+///
+/// # Errors
+/// [`ShapeError::BadParameter`] with this name and value.
+pub fn check_length(name: &'static str, value: f64) -> Result<()> {
     positive(name, value)?;
     within(name, value, SIZES, "a length must lie between 1e-9 m and 1e6 m; was a unit forgotten?")
 }

@@ -73,7 +73,7 @@ mod triangles;
 
 pub use assemble::ShapeOptions;
 pub use compare::Comparison;
-pub use error::{Defect, Result, ShapeError};
+pub use error::{Defect, Result, ShapeError, check_length};
 pub use field::SampledField;
 pub use limits::{Memory, ReadLimits, SourceFile, available_memory};
 pub use morphology::Morphology;

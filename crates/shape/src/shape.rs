@@ -1,6 +1,6 @@
 //! The grain shape.
 
-use crate::error::{Result, positive, size};
+use crate::error::{Result, check_length, positive};
 use crate::field::SampledField;
 use crate::morphology::Morphology;
 use crate::nodes::SurfaceNode;
@@ -185,7 +185,7 @@ impl Shape {
     /// Returns the shape scaled by `factor`.
     pub fn scaled(&self, factor: f64) -> Result<Shape> {
         positive("factor", factor)?;
-        size("bounding radius of the scaled shape", self.bounding_radius * factor)?;
+        check_length("bounding radius of the scaled shape", self.bounding_radius * factor)?;
         let field = match &self.field {
             Field::Sphere(radius) => Field::Sphere(radius * factor),
             Field::Sampled(field) => Field::Sampled(field.scaled(factor)),
@@ -212,7 +212,7 @@ impl Shape {
 
     /// Returns the shape scaled to the equivalent diameter `diameter` [m].
     pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
-        size("equivalent diameter", diameter)?;
+        check_length("equivalent diameter", diameter)?;
         self.scaled(diameter / self.equivalent_diameter())
     }
 }

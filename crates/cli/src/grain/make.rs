@@ -1,6 +1,6 @@
 //! `grain make`: shapes of closed form.
 
-use grainwake_shape::{Shape, ShapeOptions, analytic};
+use grainwake_shape::{Shape, ShapeOptions, analytic, check_length};
 
 use super::{diameter, grain_file, length, may_write, options, save, sized};
 use crate::args::Body;
@@ -23,20 +23,25 @@ pub fn make(body: &Body) -> Result<(), Exit> {
 }
 
 fn build(body: &Body, options: &ShapeOptions) -> Result<Shape, Exit> {
-    let three = |name: &str, texts: &[String]| -> Result<[f64; 3], Exit> {
+    // Lengths are checked as given: radii and semi-axes are half of them.
+    let size = |name: &'static str, text: &str| -> Result<f64, Exit> {
+        let value = length(name, text)?;
+        check_length(name, value)?;
+        Ok(value)
+    };
+    let three = |name: &'static str, texts: &[String]| -> Result<[f64; 3], Exit> {
         let mut values = [f64::NAN; 3];
         for (value, text) in values.iter_mut().zip(texts) {
-            *value = length(name, text)?;
+            *value = size(name, text)?;
         }
         Ok(values)
     };
     let round = |diameter: &str, height: &str| -> Result<(f64, f64), Exit> {
-        let radius = 0.5 * length("diameter", diameter)?;
-        Ok((radius, length("height", height)?))
+        Ok((0.5 * size("diameter", diameter)?, size("height", height)?))
     };
     Ok(match body {
         Body::Sphere { diameter, .. } => {
-            analytic::sphere(0.5 * length("diameter", diameter)?, options)?
+            analytic::sphere(0.5 * size("diameter", diameter)?, options)?
         }
         Body::Ellipsoid { axes, .. } => {
             let [a, b, c] = three("axes", axes)?.map(|x| 0.5 * x);

@@ -14,7 +14,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use grainwake_run::case::parse_length;
-use grainwake_run::number_format;
+use grainwake_run::check_grain_size;
 use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 
@@ -47,9 +47,6 @@ fn length(name: &str, text: &str) -> Result<f64, Exit> {
     parse_length(text).map_err(|message| Exit::input(format!("{name}: {message}")))
 }
 
-/// Accepted equivalent diameters [m]; others indicate a wrong unit.
-const GRAINS: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
-
 /// Rescales a shape to the diameter of `--equivalent-diameter`. Without it refuses an implausible
 /// size, which indicates a wrong unit of `option`.
 fn sized(shape: Shape, diameter: Option<f64>, option: &str) -> Result<Shape, Exit> {
@@ -62,19 +59,10 @@ fn sized(shape: Shape, diameter: Option<f64>, option: &str) -> Result<Shape, Exi
 
 /// Refuses a grain of implausible size, which indicates a wrong unit of `option`.
 fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
-    let diameter = shape.equivalent_diameter();
-    if GRAINS.contains(&diameter) {
-        return Ok(());
-    }
-    Err(Exit::refused(
-        format!(
-            "the grain has an equivalent diameter of {}; accepted are 1 um to 1 m",
-            number_format::length(diameter)
-        ),
-        format!(
-            "check the unit of {option} (mm or m?), or set the size with --equivalent-diameter LENGTH"
-        ),
-    ))
+    let help = format!(
+        "check the unit of {option} (mm or m?), or set the size with --equivalent-diameter LENGTH"
+    );
+    check_grain_size(shape).map_err(|message| Exit::refused(message, help))
 }
 
 /// Parses `--equivalent-diameter` [m].

@@ -112,12 +112,6 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
 }
 
 fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
-    if args.median && args.threshold.is_none() {
-        return Err(Exit::refused(
-            "--median filters grey values before the threshold, and there is no --threshold",
-            "add --threshold otsu or a grey value, or omit --median for an image of labels",
-        ));
-    }
     let mut how = ScanOptions::new(length("--voxel", &args.voxel)?);
     how.label = args.label;
     how.labels = args.labels;
@@ -143,6 +137,7 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     how.advise = true;
     how.shape = options(&args.new);
     how.shape.roundness = !args.no_roundness;
+    how.check()?;
     Ok(how)
 }
 

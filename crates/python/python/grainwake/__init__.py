@@ -8,7 +8,7 @@ from ._errors import CaseError, CaseWarning, Problem, SolverError
 from ._grainwake import Case, Grain, Scan, Simulation, Study, __version__, commit, scan
 from ._results import RunFolder
 from ._simulation import State, frame
-from ._studies import StudyFolder, open, validate
+from ._studies import StudyFolder, open, open_run, open_study, validate
 
 __all__ = [
     "Case",
@@ -27,6 +27,8 @@ __all__ = [
     "commit",
     "frame",
     "open",
+    "open_run",
+    "open_study",
     "scan",
     "validate",
 ]

@@ -2,7 +2,18 @@
 
 import os
 import pathlib
-from typing import Any, Callable, Iterator, Literal, Mapping, Sequence, TypedDict, final, overload
+from typing import (
+    Any,
+    Callable,
+    Iterator,
+    Literal,
+    Mapping,
+    Sequence,
+    SupportsIndex,
+    TypedDict,
+    final,
+    overload,
+)
 
 import numpy as np
 import numpy.typing as npt
@@ -32,15 +43,15 @@ commit: str | None
 @final
 class Grain:
     @staticmethod
-    def sphere(diameter: _Quantity, *, nodes: int | None = None) -> Grain: ...
+    def sphere(diameter: _Quantity, *, nodes: SupportsIndex | None = None) -> Grain: ...
     @staticmethod
     def ellipsoid(
         a: _Quantity,
         b: _Quantity,
         c: _Quantity,
         *,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def rounded_box(
@@ -49,24 +60,24 @@ class Grain:
         c: _Quantity,
         *,
         radius: _Quantity,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def cylinder(
         diameter: _Quantity,
         height: _Quantity,
         *,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def capsule(
         diameter: _Quantity,
         height: _Quantity,
         *,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def superquadric(
@@ -74,9 +85,9 @@ class Grain:
         b: _Quantity,
         c: _Quantity,
         *,
-        exponents: tuple[float, float],
-        cells: int | None = None,
-        nodes: int | None = None,
+        exponents: Sequence[float] | npt.NDArray[np.float64],
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def from_mesh(
@@ -85,15 +96,15 @@ class Grain:
         unit: _Quantity | None = None,
         flip: bool = False,
         equivalent_diameter: _Quantity | None = None,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def from_scan(
         image: _Path | npt.ArrayLike,
         *,
         voxel: _Quantity,
-        label: int | None = None,
+        label: SupportsIndex | None = None,
         threshold: _Threshold = None,
         median: bool = False,
         split: bool = False,
@@ -106,8 +117,8 @@ class Grain:
         labels: bool = False,
         roundness: bool = True,
         equivalent_diameter: _Quantity | None = None,
-        cells: int | None = None,
-        nodes: int | None = None,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def family(
@@ -116,9 +127,9 @@ class Grain:
         equivalent_diameter: _Quantity | None = None,
         *,
         flatness: float | None = None,
-        seed: int = 1,
-        cells: int | None = None,
-        nodes: int | None = None,
+        seed: SupportsIndex = 1,
+        cells: SupportsIndex | None = None,
+        nodes: SupportsIndex | None = None,
     ) -> Grain: ...
     @staticmethod
     def load(path: _Path) -> Grain: ...
@@ -133,7 +144,7 @@ class Grain:
     def mesh(self, kind: Literal["pyvista"] = "pyvista") -> pyvista.PolyData: ...
     @overload
     def mesh(self, kind: Literal["trimesh"]) -> trimesh.Trimesh: ...
-    def picture(self, pixels: int = 320) -> bytes: ...
+    def picture(self, pixels: SupportsIndex = 320) -> bytes: ...
     def _repr_png_(self) -> bytes: ...
     def record(self) -> dict[str, Any]: ...
     @property
@@ -194,13 +205,13 @@ class Scan:
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[int]: ...
     def __contains__(self, label: object, /) -> bool: ...
-    def __getitem__(self, label: int, /) -> Grain: ...
+    def __getitem__(self, label: SupportsIndex, /) -> Grain: ...
 
 def scan(
     image: _Path | npt.ArrayLike,
     *,
     voxel: _Quantity,
-    label: int | None = None,
+    label: SupportsIndex | None = None,
     threshold: _Threshold = None,
     median: bool = False,
     split: bool = False,
@@ -213,8 +224,8 @@ def scan(
     labels: bool = False,
     roundness: bool = True,
     equivalent_diameter: _Quantity | None = None,
-    cells: int | None = None,
-    nodes: int | None = None,
+    cells: SupportsIndex | None = None,
+    nodes: SupportsIndex | None = None,
 ) -> Scan: ...
 
 @final
@@ -235,7 +246,7 @@ class Case:
         size: _Vector,
         cell_size: _Quantity | _Vector,
         end: _Quantity,
-        refinement: int | None = None,
+        refinement: SupportsIndex | None = None,
         refinement_margin: _Quantity | _Vector | None = None,
         grains: Sequence[Mapping[str, Any]] | None = None,
         fluid: Mapping[str, Any] | None = None,
@@ -246,6 +257,8 @@ class Case:
         **tables: Any,
     ) -> Case: ...
     @staticmethod
+    def _from_parts(resolved: str, grains: Sequence[tuple[str, bytes]]) -> Case: ...
+    @staticmethod
     def schema() -> dict[str, Any]: ...
     def run(
         self,
@@ -253,12 +266,12 @@ class Case:
         *,
         resume: bool = False,
         force: bool = False,
-        start_from: str | None = None,
-        threads: int | None = None,
+        start_from: _Path | None = None,
+        threads: SupportsIndex | None = None,
         report: bool = True,
         progress: _Progress = None,
     ) -> RunFolder: ...
-    def estimate(self, threads: int | None = None) -> dict[str, Any]: ...
+    def estimate(self, threads: SupportsIndex | None = None) -> dict[str, Any]: ...
     @property
     def warnings(self) -> list[str]: ...
     @property
@@ -292,7 +305,7 @@ class Simulation:
         cls,
         case: Case,
         *,
-        threads: int | None = None,
+        threads: SupportsIndex | None = None,
         output: _Path | None = None,
         resume: bool = False,
         force: bool = False,
@@ -320,19 +333,19 @@ class Simulation:
     def contacts(self) -> _Contacts: ...
     def set_velocity(
         self,
-        grain: int,
+        grain: SupportsIndex,
         velocity: _Vector | None = None,
         angular_velocity: _Vector | None = None,
     ) -> None: ...
     def prescribe_motion(
         self,
-        grain: int,
+        grain: SupportsIndex,
         velocity: _Vector | None = None,
         angular_velocity: _Vector | None = None,
     ) -> None: ...
-    def release(self, grain: int, *, translation: bool = True, rotation: bool = True) -> None: ...
+    def release(self, grain: SupportsIndex, *, translation: bool = True, rotation: bool = True) -> None: ...
     def set_load(
-        self, grain: int, force: _Vector | None = None, torque: _Vector | None = None
+        self, grain: SupportsIndex, force: _Vector | None = None, torque: _Vector | None = None
     ) -> None: ...
     def save_checkpoint(self, path: _Path) -> None: ...
     def restore_checkpoint(self, path: _Path) -> None: ...
@@ -380,13 +393,15 @@ class Study:
         folder: _Path,
         *,
         only: str | None = None,
-        jobs: int = 1,
-        threads: int = 0,
+        jobs: SupportsIndex = 1,
+        threads: SupportsIndex = 0,
         retry: bool = False,
         keep_checkpoints: bool = False,
         accept: list[str] | None = None,
         progress: _Progress = None,
     ) -> StudyFolder: ...
+    @staticmethod
+    def _from_json(plan: str) -> Study: ...
     def plan(self) -> list[dict[str, Any]]: ...
     @property
     def title(self) -> str: ...
@@ -424,6 +439,6 @@ def _validate(
     suites: _Path | None,
     output: _Path,
     level: str,
-    threads: int,
+    threads: SupportsIndex,
     progress: _Progress,
 ) -> list[dict[str, Any]]: ...

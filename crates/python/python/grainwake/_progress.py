@@ -8,12 +8,24 @@ import time as clock
 import warnings
 from typing import Any, Callable, Sequence, Union
 
-from ._errors import CaseWarning
+import numpy as np
+
+from ._errors import CaseError, CaseWarning
 
 Choice = Union[bool, Callable[[dict[str, Any]], object], None]
 
 _log = logging.getLogger("grainwake")
 _TICKS = 1000
+
+
+def check(choice: object) -> None:
+    """Refuse a choice of another kind."""
+    if choice is None or isinstance(choice, (bool, np.bool_)) or callable(choice):
+        return
+    kind = type(choice).__name__
+    raise CaseError(
+        f"progress: found a value of type {kind}; expected True, False or a callable"
+    )
 
 
 def _interactive() -> bool:
@@ -57,7 +69,7 @@ class _Tqdm:
 
 
 def _bar(choice: Choice) -> _Line | _Tqdm | None:
-    if choice is False or callable(choice) or (choice is None and not _interactive()):
+    if callable(choice) or not (_interactive() if choice is None else choice):
         return None
     try:
         from tqdm.auto import tqdm

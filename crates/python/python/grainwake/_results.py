@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 import pathlib
 import warnings
-from typing import TYPE_CHECKING, Any, Callable, Union
+from typing import TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
 import numpy as np
 
@@ -112,7 +113,7 @@ class RunFolder:
             table["contacts"] = table["contacts"].astype("int64")
         return table
 
-    def grain(self, index: int) -> pandas.DataFrame:
+    def grain(self, index: SupportsIndex) -> pandas.DataFrame:
         """Motion of one grain, indexed by time.
 
         Parameters
@@ -120,6 +121,7 @@ class RunFolder:
         index : int
             Index of the grain.
         """
+        index = operator.index(index)
         table = self.grains
         known = sorted(table["grain"].unique().tolist())
         if index not in known:

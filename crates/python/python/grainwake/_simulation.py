@@ -27,7 +27,7 @@ _SHORTEST = 0.1
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class State:
-    """Motion of the grains at one time; the arrays are copies.
+    """Motion of the grains at one time; the arrays are read-only copies.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, Sequence
 
 from . import _grainwake
-from ._errors import CaseWarning
+from ._errors import CaseError, CaseWarning
 from ._optional import need
 from ._progress import Choice
 from ._results import Path, RunFolder
@@ -39,13 +39,74 @@ def open(path: Path) -> RunFolder | StudyFolder:
     -----
     CaseWarning
         Parts of the folder are missing or damaged; `RunFolder.notes` lists them.
+
+    See Also
+    --------
+    open_run, open_study : one kind of folder, with the type of the result.
     """
+    folder = _folder(path)
+    return StudyFolder(folder) if _holds_study(folder) else RunFolder(folder)
+
+
+def open_run(path: Path) -> RunFolder:
+    """Open a run folder, as `open` does.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder written by `Case.run`, `Simulation` or the command line.
+
+    Returns
+    -------
+    RunFolder
+
+    Raises
+    ------
+    CaseError
+        The folder holds no run.
+    FileNotFoundError
+        There is no such folder.
+    """
+    folder = _folder(path)
+    if _holds_study(folder):
+        raise CaseError(f"{folder} holds a study, not a run; open it with open_study")
+    return RunFolder(folder)
+
+
+def open_study(path: Path) -> StudyFolder:
+    """Open a study folder, as `open` does.
+
+    Parameters
+    ----------
+    path : path-like
+        Folder written by `Study.run` or the command line.
+
+    Returns
+    -------
+    StudyFolder
+
+    Raises
+    ------
+    CaseError
+        The folder holds no study.
+    FileNotFoundError
+        There is no such folder.
+    """
+    folder = _folder(path)
+    if not _holds_study(folder):
+        raise CaseError(f"{folder} holds no study; a run is opened with open_run")
+    return StudyFolder(folder)
+
+
+def _folder(path: Path) -> pathlib.Path:
     folder = pathlib.Path(path)
     if not folder.is_dir():
         raise FileNotFoundError(f"there is no folder {folder}")
-    if (folder / "study.json").is_file():
-        return StudyFolder(folder)
-    return RunFolder(folder)
+    return folder
+
+
+def _holds_study(folder: pathlib.Path) -> bool:
+    return (folder / "study.json").is_file()
 
 
 class StudyFolder:

@@ -3,28 +3,26 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
+use grainwake_run::case::Problem;
 use grainwake_run::case::quantity::Length;
-use grainwake_run::number_format;
+use grainwake_run::check_grain_size;
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
 use grainwake_shape::mesh::{
     MeshOptions, TriangleMesh, mesh_from_memory, read_mesh, shape_from_mesh,
 };
-use grainwake_shape::{ReadLimits, Shape, ShapeOptions, analytic};
+use grainwake_shape::{ReadLimits, Shape, ShapeOptions, analytic, check_length};
 use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use super::PyGrain;
-use crate::arguments::{Whole, array, points, quantity, wrong_shape};
-use crate::error::{Raise, input};
-
-/// Accepted equivalent diameters [m]; others indicate a wrong unit.
-const GRAINS: std::ops::Range<f64> = 1e-6..1.0;
+use crate::arguments::{Whole, array, plain_numbers, points, quantity, seed, whole, wrong_shape};
+use crate::error::{Raise, input, refused};
 
 /// Returns the options of the resolution.
-pub(super) fn options(cells: Option<Whole>, nodes: Option<Whole>) -> ShapeOptions {
-    let [cells, nodes] = [cells, nodes].map(|count| count.map(usize::from));
-    ShapeOptions { cells, nodes, ..ShapeOptions::default() }
+pub(super) fn options(cells: Option<&Whole>, nodes: Option<&Whole>) -> PyResult<ShapeOptions> {
+    let (cells, nodes) = (whole("cells", cells, 1)?, whole("nodes", nodes, 1)?);
+    Ok(ShapeOptions { cells, nodes, ..ShapeOptions::default() })
 }
 
 /// Rescales a shape on request; without it refuses an implausible size, which indicates a wrong
@@ -38,15 +36,33 @@ pub(super) fn sized(
         let diameter = quantity::<Length>("equivalent_diameter", diameter)?;
         return shape.scaled_to_equivalent_diameter(diameter).raise();
     }
-    let diameter = shape.equivalent_diameter();
-    if GRAINS.contains(&diameter) {
-        return Ok(shape);
-    }
-    Err(input(format!(
-        "the grain has an equivalent diameter of {}; accepted are 1 um to 1 m; check {unit} (mm or \
-         m?), or set the size with equivalent_diameter=LENGTH",
-        number_format::length(diameter)
-    )))
+    plausible(&shape, &check_unit(unit))?;
+    Ok(shape)
+}
+
+/// Returns the remedy of an implausible size that a wrong value of the argument `unit` causes.
+pub(super) fn check_unit(unit: &str) -> String {
+    format!("check {unit} (mm or m?), or set the size with equivalent_diameter=LENGTH")
+}
+
+/// Refuses a shape of implausible size with this remedy.
+pub(super) fn plausible(shape: &Shape, help: &str) -> PyResult<()> {
+    check_grain_size(shape).map_err(|message| refused(&[Problem::new(message).help(help)]))
+}
+
+/// Builds a grain of closed form and refuses an implausible size.
+fn closed_form(
+    py: Python<'_>,
+    cells: Option<&Whole>,
+    nodes: Option<&Whole>,
+    build: impl FnOnce(&ShapeOptions) -> grainwake_shape::Result<Shape> + Send,
+) -> PyResult<PyGrain> {
+    let options = options(cells, nodes)?;
+    let shape = py.detach(|| build(&options)).raise()?;
+    let help = "check the lengths: a number is in m, a string has its unit, such as \"2 mm\"; \
+                scaled() gives a grain any size";
+    plausible(&shape, help)?;
+    Ok(PyGrain::new(shape))
 }
 
 #[pymethods]
@@ -70,8 +86,9 @@ impl PyGrain {
         diameter: &Bound<'_, PyAny>,
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
-        let radius = 0.5 * quantity::<Length>("diameter", diameter)?;
-        py.detach(|| analytic::sphere(radius, &options(None, nodes))).raise().map(PyGrain::new)
+        let [diameter] = lengths([("diameter", diameter)])?;
+        let build = |how: &_| analytic::sphere(0.5 * diameter, how);
+        closed_form(py, None, nodes.as_ref(), build)
     }
 
     /// Ellipsoid.
@@ -99,8 +116,8 @@ impl PyGrain {
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [a, b, c] = lengths([("a", a), ("b", b), ("c", c)])?.map(|axis| 0.5 * axis);
-        let how = options(cells, nodes);
-        py.detach(|| analytic::ellipsoid(a, b, c, &how)).raise().map(PyGrain::new)
+        let build = |how: &_| analytic::ellipsoid(a, b, c, how);
+        closed_form(py, cells.as_ref(), nodes.as_ref(), build)
     }
 
     /// Box with rounded edges.
@@ -130,8 +147,8 @@ impl PyGrain {
     ) -> PyResult<PyGrain> {
         let [a, b, c] = lengths([("a", a), ("b", b), ("c", c)])?;
         let radius = quantity::<Length>("radius", radius)?;
-        let how = options(cells, nodes);
-        py.detach(|| analytic::rounded_box(a, b, c, radius, &how)).raise().map(PyGrain::new)
+        let build = |how: &_| analytic::rounded_box(a, b, c, radius, how);
+        closed_form(py, cells.as_ref(), nodes.as_ref(), build)
     }
 
     /// Cylinder.
@@ -156,8 +173,8 @@ impl PyGrain {
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [diameter, height] = lengths([("diameter", diameter), ("height", height)])?;
-        let how = options(cells, nodes);
-        py.detach(|| analytic::cylinder(0.5 * diameter, height, &how)).raise().map(PyGrain::new)
+        let build = |how: &_| analytic::cylinder(0.5 * diameter, height, how);
+        closed_form(py, cells.as_ref(), nodes.as_ref(), build)
     }
 
     /// Capsule: a cylinder between two half spheres.
@@ -184,8 +201,8 @@ impl PyGrain {
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let [diameter, height] = lengths([("diameter", diameter), ("height", height)])?;
-        let how = options(cells, nodes);
-        py.detach(|| analytic::capsule(0.5 * diameter, height, &how)).raise().map(PyGrain::new)
+        let build = |how: &_| analytic::capsule(0.5 * diameter, height, how);
+        closed_form(py, cells.as_ref(), nodes.as_ref(), build)
     }
 
     /// Superquadric (Barr 1981).
@@ -194,7 +211,7 @@ impl PyGrain {
     /// ----------
     /// a, b, c : float or str
     ///     Full axes [m].
-    /// exponents : tuple of two float
+    /// exponents : sequence of two float
     ///     Exponents e1, e2, 0.1 to 2; (1, 1) is an ellipsoid.
     /// cells, nodes : int, optional
     ///     Resolution, as in `ellipsoid`.
@@ -209,14 +226,14 @@ impl PyGrain {
         a: &Bound<'_, PyAny>,
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
-        exponents: (f64, f64),
+        exponents: &Bound<'_, PyAny>,
         cells: Option<Whole>,
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let semi_axes = lengths([("a", a), ("b", b), ("c", c)])?.map(|axis| 0.5 * axis);
-        let (e1, e2) = exponents;
-        let how = options(cells, nodes);
-        py.detach(|| analytic::superquadric(semi_axes, e1, e2, &how)).raise().map(PyGrain::new)
+        let [e1, e2] = plain_numbers("exponents", exponents)?;
+        let build = |how: &_| analytic::superquadric(semi_axes, e1, e2, how);
+        closed_form(py, cells.as_ref(), nodes.as_ref(), build)
     }
 
     /// Grain of a closed surface mesh.
@@ -254,7 +271,7 @@ impl PyGrain {
         cells: Option<Whole>,
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
-        let how = MeshOptions { shape: options(cells, nodes), flip };
+        let how = MeshOptions { shape: options(cells.as_ref(), nodes.as_ref())?, flip };
         let unit = unit.map(unit_length).transpose()?;
         let built = if let Ok(path) = mesh.extract::<PathBuf>() {
             let unit = unit.ok_or_else(|| {
@@ -304,25 +321,27 @@ impl PyGrain {
         roundness: f64,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
         flatness: Option<f64>,
-        seed: u64,
+        #[pyo3(from_py_with = seed)] seed: u64,
         cells: Option<Whole>,
         nodes: Option<Whole>,
     ) -> PyResult<PyGrain> {
         let diameter = equivalent_diameter
             .map_or(Ok(2e-3), |value| quantity::<Length>("equivalent_diameter", value))?;
         let mut how = family_options();
-        how.nodes = nodes.map(usize::from);
-        how.cells = cells.map(usize::from).or(how.cells);
+        how.nodes = whole("nodes", nodes.as_ref(), 1)?;
+        how.cells = whole("cells", cells.as_ref(), 1)?.or(how.cells);
         let mut target = FamilyTarget::new(sphericity, roundness, diameter);
         target.flatness = flatness.unwrap_or(target.flatness);
         py.detach(|| family_grain(&target, seed, &how)).raise().map(PyGrain::new)
     }
 }
 
-fn lengths<const N: usize>(named: [(&str, &Bound<'_, PyAny>); N]) -> PyResult<[f64; N]> {
+/// Returns lengths [m]. They are checked as given: radii and semi-axes are half of them.
+fn lengths<const N: usize>(named: [(&'static str, &Bound<'_, PyAny>); N]) -> PyResult<[f64; N]> {
     let mut values = [f64::NAN; N];
     for (value, (name, given)) in values.iter_mut().zip(named) {
         *value = quantity::<Length>(name, given)?;
+        check_length(name, *value).raise()?;
     }
     Ok(values)
 }

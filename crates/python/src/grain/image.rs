@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use grainwake_run::case::quantity::Length;
+use grainwake_shape::ReadLimits;
 use grainwake_shape::scan::{
     Scan, ScanOptions, Threshold, Voxels, read_volume_and_voxel, scan_volume,
 };
-use grainwake_shape::{ReadLimits, ShapeError};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator, PyString};
 
 use super::PyGrain;
-use super::build::{options, sized};
+use super::build::{check_unit, options, plausible, sized};
 use super::volume;
-use crate::arguments::{Whole, quantity};
-use crate::error::{IntoException, Raise, input, warn};
+use crate::arguments::{Whole, quantity, whole};
+use crate::error::{Raise, input, warn};
 
 /// Grains of a 3-D image, by label.
 #[pyclass(module = "grainwake", name = "Scan", frozen)]
@@ -83,7 +83,7 @@ impl PyScan {
 
 /// Options of a scan as Python gives them.
 struct Given {
-    label: Option<u32>,
+    label: Option<Whole>,
     median: bool,
     split: bool,
     separate: Option<f64>,
@@ -99,9 +99,10 @@ struct Given {
 }
 
 impl Given {
-    fn options(self, voxel: f64, threshold: Option<Threshold>) -> ScanOptions {
+    /// Returns the checked options.
+    fn options(self, voxel: f64, threshold: Option<Threshold>) -> PyResult<ScanOptions> {
         let mut how = ScanOptions::new(voxel);
-        how.label = self.label;
+        how.label = whole("label", self.label.as_ref(), 0)?;
         how.threshold = threshold;
         how.median = self.median;
         how.split = self.split;
@@ -112,9 +113,10 @@ impl Given {
         how.smoothing = self.smoothing;
         how.rescue = self.rescue;
         how.labels = self.labels;
-        how.shape = options(self.cells, self.nodes);
+        how.shape = options(self.cells.as_ref(), self.nodes.as_ref())?;
         how.shape.roundness = self.roundness;
-        how
+        how.check().raise()?;
+        Ok(how)
     }
 }
 
@@ -134,7 +136,7 @@ impl PyGrain {
     /// threshold : float or {"otsu", "otsu3"}, optional
     ///     Grey value between void and solid; required for grey images.
     /// median : bool, default False
-    ///     Apply a median of 27 voxels before the threshold.
+    ///     Apply a median of 27 voxels before the threshold, which is then required.
     /// split : bool, default False
     ///     Treat each connected piece of solid as a grain.
     /// separate : float, optional
@@ -177,7 +179,7 @@ impl PyGrain {
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         voxel: &Bound<'_, PyAny>,
-        label: Option<u32>,
+        label: Option<Whole>,
         threshold: Option<&Bound<'_, PyAny>>,
         median: bool,
         split: bool,
@@ -239,7 +241,7 @@ impl PyGrain {
 /// threshold : float or {"otsu", "otsu3"}, optional
 ///     Grey value between void and solid; required for grey images.
 /// median : bool, default False
-///     Apply a median of 27 voxels before the threshold.
+///     Apply a median of 27 voxels before the threshold, which is then required.
 /// split : bool, default False
 ///     Treat each connected piece of solid as a grain.
 /// separate : float, optional
@@ -274,7 +276,7 @@ pub fn scan(
     py: Python<'_>,
     image: &Bound<'_, PyAny>,
     voxel: &Bound<'_, PyAny>,
-    label: Option<u32>,
+    label: Option<Whole>,
     threshold: Option<&Bound<'_, PyAny>>,
     median: bool,
     split: bool,
@@ -326,8 +328,10 @@ pub fn scan(
     // Only the largest grain is checked, because fragments may be small.
     let largest = accepted.values().map(|grain| &grain.get().shape);
     let size = |shape: &&std::sync::Arc<grainwake_shape::Shape>| shape.equivalent_diameter();
-    if let Some(shape) = largest.max_by(|a, b| size(a).total_cmp(&size(b))) {
-        sized(shape.as_ref().clone(), None, "voxel")?;
+    if let (Some(shape), None) =
+        (largest.max_by(|a, b| size(a).total_cmp(&size(b))), equivalent_diameter)
+    {
+        plausible(shape, &check_unit("voxel"))?;
     }
     let [nx, ny, nz] = labels.dims;
     let Voxels::Labels(values) = labels.voxels else {
@@ -348,7 +352,7 @@ fn read(
     given: Given,
 ) -> PyResult<Scan> {
     let voxel = quantity::<Length>("voxel", voxel)?;
-    let how = given.options(voxel, threshold.map(segmentation).transpose()?);
+    let how = given.options(voxel, threshold.map(segmentation).transpose()?)?;
     let quiet = |_: &str, _: u64, _: u64| {};
     let scanned = if let Ok(path) = image.extract::<PathBuf>() {
         let (volume, source, stated) = py
@@ -373,13 +377,7 @@ fn read(
             scan_volume(&volume, &source, &how, &quiet)
         })
     };
-    scanned.map_err(|error| match error {
-        // The message of the library names an option of the command line.
-        ShapeError::Unsupported { .. } if how.threshold.is_none() => input(format!(
-            "{error}; in Python: threshold=\"otsu\", \"otsu3\" or a grey value, or labels=True"
-        )),
-        error => error.into_exception(),
-    })
+    scanned.raise()
 }
 
 fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {

@@ -14,8 +14,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arguments::quantity;
-use crate::arrays::{json, numbers, rows, vectors};
+use crate::arguments::{pixels, quantity};
+use crate::arrays::{json, numbers, read_only, rows, vectors};
 use crate::error::{Raise, input};
 
 pub use image::PyScan;
@@ -41,6 +41,15 @@ impl PyGrain {
     pub fn new(shape: impl Into<Arc<Shape>>) -> PyGrain {
         let shape = shape.into();
         PyGrain { record: shape.record(), shape }
+    }
+
+    /// Returns views from three sides as PNG.
+    fn drawn<'py>(&self, py: Python<'py>, pixels: usize) -> PyResult<Bound<'py, PyBytes>> {
+        let mut bytes = Vec::new();
+        let drawn =
+            py.detach(|| Picture::three_sides(&self.shape, pixels, false).encode(&mut bytes));
+        drawn.map_err(|error| crate::error::system(error.kind(), error.to_string()))?;
+        Ok(PyBytes::new(py, &bytes))
     }
 }
 
@@ -124,11 +133,16 @@ impl PyGrain {
     /// density : float or str
     ///     Density [kg/m3].
     /// **keys
-    ///     Further keys of ``[[grain]]``: orientation, velocity, motion, gap_above, ...
+    ///     Further keys of an entry: orientation, velocity, motion, gap_above, ...
     ///
     /// Returns
     /// -------
     /// dict
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     ``file`` or ``shape`` is among the keys: the grain is the shape.
     #[pyo3(signature = (position, *, density, **keys))]
     fn at<'py>(
         slf: &Bound<'py, Self>,
@@ -137,6 +151,16 @@ impl PyGrain {
         keys: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         quantity::<Density>("density", density)?;
+        for name in ["file", "shape"] {
+            if let Some(keys) = keys
+                && keys.contains(name)?
+            {
+                return Err(input(format!(
+                    "{name}: the grain itself is the shape of the entry; omit {name}, or write the \
+                     entry as a dict"
+                )));
+            }
+        }
         let entry = PyDict::new(slf.py());
         entry.set_item("file", slf)?;
         entry.set_item("position", position)?;
@@ -207,25 +231,25 @@ impl PyGrain {
     /// Parameters
     /// ----------
     /// pixels : int, default 320
-    ///     Width of one view.
+    ///     Width of one view, 16 to 4096.
     ///
     /// Returns
     /// -------
     /// bytes
     #[pyo3(signature = (pixels = 320))]
-    fn picture<'py>(&self, py: Python<'py>, pixels: usize) -> PyResult<Bound<'py, PyBytes>> {
+    fn picture<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = pixels)] pixels: usize,
+    ) -> PyResult<Bound<'py, PyBytes>> {
         if !(16..=4096).contains(&pixels) {
             return Err(input(format!("pixels: found {pixels}; expected 16 to 4096")));
         }
-        let mut bytes = Vec::new();
-        let drawn =
-            py.detach(|| Picture::three_sides(&self.shape, pixels, false).encode(&mut bytes));
-        drawn.map_err(|error| crate::error::system(error.kind(), error.to_string()))?;
-        Ok(PyBytes::new(py, &bytes))
+        self.drawn(py, pixels)
     }
 
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        self.picture(py, 200)
+        self.drawn(py, 200)
     }
 
     /// All measures of the shape, with the names of ``grainwake grain info --json``.
@@ -315,17 +339,17 @@ impl PyGrain {
     /// Principal second moments per unit density [m5], shape (3,).
     #[getter]
     fn inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        numbers(py, self.record.inertia_m5.to_vec())
+        read_only(numbers(py, self.record.inertia_m5.to_vec()))
     }
     /// Surface nodes in the frame of the grain [m], shape (n, 3).
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.shape.nodes().iter().map(|node| node.position))
+        read_only(vectors(py, self.shape.nodes().iter().map(|node| node.position)))
     }
     /// Area of each surface node [m2], shape (n,).
     #[getter]
     fn node_areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        numbers(py, self.shape.nodes().iter().map(|node| node.area).collect())
+        read_only(numbers(py, self.shape.nodes().iter().map(|node| node.area).collect()))
     }
     /// Origin of the shape: "analytic", "mesh", "scan" or "family".
     #[getter]

@@ -9,11 +9,14 @@ use std::path::PathBuf;
 
 use grainwake_formats::codec::{Decoder, Encoder};
 use grainwake_formats::disk::write_atomically;
+use grainwake_run::case::Case;
+use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::TrackerState;
+use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use pyo3::prelude::*;
 use sha2::{Digest, Sha256};
 
-use super::PySimulation;
+use super::{PySimulation, changing, reading, watch};
 use crate::error::{input, system};
 
 const SIGNATURE: &[u8; 8] = b"GWSTATE\n";
@@ -35,7 +38,9 @@ impl PySimulation {
         Ok(bytes)
     }
 
-    fn decode(&mut self, bytes: &[u8]) -> Result<(), String> {
+    /// Replaces the simulation by a new one in the state of a checkpoint: nothing that was set or
+    /// that failed since is left.
+    fn decode(&mut self, case: &Case, bytes: &[u8]) -> Result<(), String> {
         let text = |error: io::Error| error.to_string();
         let Some(body) = bytes.len().checked_sub(CHECKSUM).and_then(|end| bytes.get(..end)) else {
             return Err("it is cut off".into());
@@ -52,20 +57,25 @@ impl PySimulation {
         if version != VERSION {
             return Err(format!("its version is {version}, this program reads version {VERSION}"));
         }
-        if decoder.bytes().map_err(text)? != self.case.get().case.digest.as_bytes() {
+        if decoder.bytes().map_err(text)? != case.digest.as_bytes() {
             return Err("it belongs to another case".into());
         }
         let events =
             serde_json::from_slice::<Option<TrackerState>>(&decoder.bytes().map_err(text)?)
                 .map_err(|error| error.to_string())?;
-        let restored = self.pool.install(|| self.sim.restore(&mut rest));
-        restored.map_err(|error| {
-            self.failed = Some("the state could not be restored".into());
-            text(error)
+        self.failed = Some("the state could not be restored".into());
+        self.pool.clone().install(|| {
+            // The memory of the old simulation is free before the new one is built.
+            let empty = Setup::new(Mesh::cubic([1; 3], 1.0)).with_step(StepRule::Fixed(1.0));
+            self.sim = Simulation::new(empty).map_err(|error| error.to_string())?;
+            self.sim = Simulation::new(case.setup.clone()).map_err(|error| error.to_string())?;
+            self.watch = watch(case, &self.sim);
+            self.sim.restore(&mut rest).map_err(text)
         })?;
         if let (Some(watch), Some(events)) = (&mut self.watch, events) {
             watch.tracker.restore(events);
         }
+        self.failed = None;
         Ok(())
     }
 }
@@ -88,17 +98,18 @@ impl PySimulation {
     /// -----
     /// Prescribed motions and external loads are not part of the state: set them again after
     /// `restore_checkpoint`.
-    fn save_checkpoint(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        self.has_not_failed()?;
-        let written = py.detach(|| {
-            let bytes = self.encode()?;
+    fn save_checkpoint(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        let this = &*reading(slf)?;
+        this.has_not_failed()?;
+        let written = slf.py().detach(|| {
+            let bytes = this.encode()?;
             write_atomically(&path, true, |out| out.write_all(&bytes))
         });
         written.map_err(|e| system(e.kind(), format!("cannot write {}: {e}", path.display())))
     }
 
     /// Restore a state written by `save_checkpoint` of a simulation of the same case. The
-    /// simulation then continues bitwise identically.
+    /// simulation then continues bitwise identically, also after a `SolverError`.
     ///
     /// Parameters
     /// ----------
@@ -108,17 +119,28 @@ impl PySimulation {
     /// Raises
     /// ------
     /// CaseError
-    ///     The file is damaged or belongs to another case.
-    fn restore_checkpoint(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        self.may_change()?;
-        if self.recording.is_some() {
+    ///     The file is damaged or belongs to another case, or the simulation has a run folder.
+    /// BufferError
+    ///     An array shows the fields of the present state.
+    ///
+    /// Notes
+    /// -----
+    /// Prescribed motions and external loads set before are removed: the case alone moves the
+    /// grains from then on.
+    fn restore_checkpoint(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        let this = &mut *changing(slf)?;
+        this.has_no_views()?;
+        if this.output.is_some() {
             return Err(input(
                 "a simulation with a run folder continues with Simulation(case, output=..., resume=True)",
             ));
         }
         let bytes = std::fs::read(&path)
             .map_err(|e| system(e.kind(), format!("cannot read {}: {e}", path.display())))?;
-        py.detach(|| self.decode(&bytes))
+        let case = this.case.clone_ref(slf.py());
+        let case = &case.get().case;
+        slf.py()
+            .detach(|| this.decode(case, &bytes))
             .map_err(|why| input(format!("{} cannot be restored: {why}", path.display())))
     }
 }

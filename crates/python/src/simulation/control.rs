@@ -9,7 +9,7 @@ use grainwake_solver::sim::MotionComponent;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use super::PySimulation;
+use super::{PySimulation, changing};
 use crate::arguments::vector;
 use crate::error::{Raise, input};
 
@@ -46,6 +46,18 @@ impl PySimulation {
     }
 }
 
+/// Returns the simulation and the index of a grain that may be controlled: not after a failed step
+/// and not after the run folder was closed, where control has no effect.
+fn controlled<'py>(
+    slf: &Bound<'py, PySimulation>,
+    grain: i64,
+) -> PyResult<(PyRefMut<'py, PySimulation>, usize)> {
+    let this = changing(slf)?;
+    this.may_continue()?;
+    let grain = this.index(grain)?;
+    Ok((this, grain))
+}
+
 #[pymethods]
 impl PySimulation {
     /// Set the present velocity of a free grain. The fluid receives the change as an impulse in the
@@ -65,16 +77,16 @@ impl PySimulation {
     /// IndexError
     ///     There is no such grain.
     /// CaseError
-    ///     The motion is prescribed, or a component is not finite.
+    ///     The motion is prescribed, a component is not finite, or the run folder is closed.
     #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
     fn set_velocity(
-        &mut self,
+        slf: &Bound<'_, Self>,
         grain: i64,
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let grain = self.index(grain)?;
-        let Grain { translation, rotation, .. } = self.sim.grains()[grain];
+        let (mut this, grain) = controlled(slf, grain)?;
+        let Grain { translation, rotation, .. } = this.sim.grains()[grain];
         let mut motions = motions(velocity, angular_velocity)?;
         // A prescribed motion is refused before the other one has changed.
         motions.sort_by_key(|(component, _)| match component {
@@ -82,7 +94,7 @@ impl PySimulation {
             MotionComponent::Rotation => rotation == MotionConstraint::Free,
         });
         for (component, value) in motions {
-            self.sim.set_velocity(grain, component, value).raise()?;
+            this.sim.set_velocity(grain, component, value).raise()?;
         }
         Ok(())
     }
@@ -103,14 +115,14 @@ impl PySimulation {
     /// release : let the grain move freely again.
     #[pyo3(signature = (grain, velocity = None, angular_velocity = None))]
     fn prescribe_motion(
-        &mut self,
+        slf: &Bound<'_, Self>,
         grain: i64,
         velocity: Option<&Bound<'_, PyAny>>,
         angular_velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let grain = self.index(grain)?;
+        let (mut this, grain) = controlled(slf, grain)?;
         for (component, value) in motions(velocity, angular_velocity)? {
-            self.sim.prescribe_velocity(grain, component, value).raise()?;
+            this.sim.prescribe_velocity(grain, component, value).raise()?;
         }
         Ok(())
     }
@@ -124,12 +136,17 @@ impl PySimulation {
     /// translation, rotation : bool, default True
     ///     Motions to release.
     #[pyo3(signature = (grain, *, translation = true, rotation = true))]
-    fn release(&mut self, grain: i64, translation: bool, rotation: bool) -> PyResult<()> {
-        let grain = self.index(grain)?;
+    fn release(
+        slf: &Bound<'_, Self>,
+        grain: i64,
+        translation: bool,
+        rotation: bool,
+    ) -> PyResult<()> {
+        let (mut this, grain) = controlled(slf, grain)?;
         let chosen =
             [(MotionComponent::Translation, translation), (MotionComponent::Rotation, rotation)];
         for (component, _) in chosen.into_iter().filter(|(_, chosen)| *chosen) {
-            self.sim.release(grain, component).raise()?;
+            this.sim.release(grain, component).raise()?;
         }
         Ok(())
     }
@@ -147,16 +164,16 @@ impl PySimulation {
     ///     Torque about the centroid [N m] in the space frame; zero if not given.
     #[pyo3(signature = (grain, force = None, torque = None))]
     fn set_load(
-        &mut self,
+        slf: &Bound<'_, Self>,
         grain: i64,
         force: Option<&Bound<'_, PyAny>>,
         torque: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let grain = self.index(grain)?;
+        let (mut this, grain) = controlled(slf, grain)?;
         let load = Load {
             force: optional::<Force>("force", force)?.unwrap_or(DVec3::ZERO),
             torque: optional::<Torque>("torque", torque)?.unwrap_or(DVec3::ZERO),
         };
-        self.sim.set_external_load(grain, load).raise()
+        this.sim.set_external_load(grain, load).raise()
     }
 }

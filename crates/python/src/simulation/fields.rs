@@ -12,7 +12,7 @@ use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::PySimulation;
+use super::{PySimulation, reading};
 use crate::arguments::points;
 use crate::arrays::{numbers, vectors};
 use crate::error::input;
@@ -59,7 +59,7 @@ fn show<'py, R: Element + Copy>(
     owner: &Bound<'py, PySimulation>,
     view: FieldView<'_, R>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let views = owner.try_borrow()?.views.clone();
+    let views = reading(owner)?.views.clone();
     views.fetch_add(1, Ordering::Acquire);
     let guard = Bound::new(owner.py(), FieldGuard { views, _owner: owner.clone().unbind() })?;
     let shape = view.shape().strides(view.strides());
@@ -94,7 +94,7 @@ impl PySimulation {
     /// ``BufferError``: copy the values that are needed later, and delete the array.
     fn fluid_velocity<'py>(slf: &Bound<'py, Self>, axis: &str) -> PyResult<Bound<'py, PyAny>> {
         let component = self::axis(axis)?;
-        let this = slf.try_borrow()?;
+        let this = reading(slf)?;
         shown(slf, this.sim.velocity(component).ok_or_else(dry)?)
     }
 
@@ -105,7 +105,7 @@ impl PySimulation {
     /// ndarray, read-only
     ///     Pressure over density [m2/s2], shape (z, y, x). The notes of `fluid_velocity` apply.
     fn kinematic_pressure<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let this = slf.try_borrow()?;
+        let this = reading(slf)?;
         shown(slf, this.sim.kinematic_pressure().ok_or_else(dry)?)
     }
 
@@ -120,21 +120,23 @@ impl PySimulation {
     /// -------
     /// ndarray of float64
     ///     Copy, shape (z, y, x), for vectors (z, y, x, 3).
-    fn cell_field<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    fn cell_field<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), reading(slf)?);
+        let sim = &this.sim;
         let field = CELL_FIELDS.iter().find(|field| field.name == name).ok_or_else(|| {
             let known: Vec<&str> = CELL_FIELDS.iter().map(|field| field.name).collect();
             input(format!("name: found \"{name}\"; expected one of {}", known.join(", ")))
         })?;
-        if self.sim.setup().fluid.is_none() {
+        if sim.setup().fluid.is_none() {
             return Err(dry());
         }
-        let [nx, ny, nz] = self.sim.mesh().cells;
+        let [nx, ny, nz] = sim.mesh().cells;
         let values = py.detach(|| {
             let mut values = Vec::with_capacity(nx * ny * nz * field.components);
             for k in 0..nz {
                 for j in 0..ny {
                     for i in 0..nx {
-                        let value = field.at(&self.sim, [i, j, k]).to_array();
+                        let value = field.at(sim, [i, j, k]).to_array();
                         values.extend_from_slice(&value[..field.components]);
                     }
                 }
@@ -162,12 +164,12 @@ impl PySimulation {
     ///     Coordinates along each axis [m].
     #[pyo3(signature = (axis = None))]
     fn coordinates<'py>(
-        &self,
-        py: Python<'py>,
+        slf: &Bound<'py, Self>,
         axis: Option<&str>,
     ) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
         let normal = axis.map(self::axis).transpose()?;
-        let mesh = self.sim.mesh();
+        let (py, this) = (slf.py(), reading(slf)?);
+        let mesh = this.sim.mesh();
         let along = |axis: usize| {
             let on_faces = normal.is_some_and(|normal| normal as usize == axis);
             let (count, offset) =
@@ -190,16 +192,17 @@ impl PySimulation {
     /// ndarray, shape (n, 3)
     ///     Velocity [m/s]; NaN outside the box.
     fn interpolate_velocity<'py>(
-        &self,
-        py: Python<'py>,
+        slf: &Bound<'py, Self>,
         at: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        if self.sim.setup().fluid.is_none() {
+        let places = points("at", at)?;
+        let (py, this) = (slf.py(), reading(slf)?);
+        let sim = &this.sim;
+        if sim.setup().fluid.is_none() {
             return Err(dry());
         }
-        let places = points("at", at)?;
         let found: Vec<DVec3> = py.detach(|| {
-            let velocity = |x: &DVec3| self.sim.interpolate_velocity(*x).unwrap_or(DVec3::NAN);
+            let velocity = |x: &DVec3| sim.interpolate_velocity(*x).unwrap_or(DVec3::NAN);
             places.iter().map(velocity).collect()
         });
         Ok(vectors(py, found.into_iter()))
@@ -214,7 +217,7 @@ impl PySimulation {
     fn to_xarray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let fields = PyDict::new(slf.py());
         for field in CELL_FIELDS {
-            let values = slf.try_borrow()?.cell_field(slf.py(), field.name)?;
+            let values = PySimulation::cell_field(slf, field.name)?;
             fields.set_item(field.name, (field.unit, values))?;
         }
         slf.py().import("grainwake._simulation")?.call_method1("dataset", (slf, fields))

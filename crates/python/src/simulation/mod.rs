@@ -12,17 +12,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use grainwake_formats::summary::EndReason;
+use grainwake_run::case::Case;
 use grainwake_run::case::quantity::Time;
-use grainwake_run::number_format::number_of_grains;
+use grainwake_run::number_format::{number_of_grains, quantity as seconds};
 use grainwake_run::{Recording, Watch, admit_memory};
 use grainwake_solver::sim::{SAME_TIME, Simulation};
-use pyo3::exceptions::PyBufferError;
+use pyo3::exceptions::{PyBufferError, PyRuntimeError};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::arguments::{Whole, quantity};
 use crate::case::PyCase;
-use crate::error::{Raise, input, numerics};
+use crate::error::{Raise, input, numerics, warn};
+use crate::running::check_progress;
 use crate::threads;
 use recording::Failure;
 
@@ -57,10 +59,19 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 /// OSError
 ///     Reading or writing failed.
 ///
+/// RuntimeError
+///     Another thread uses the simulation; each of its methods and attributes may raise this.
+///
+/// Warns
+/// -----
+/// CaseWarning
+///     Settings of the case impair the results, as in `Case.warnings`.
+///
 /// Notes
 /// -----
-/// The global interpreter lock is released during steps. Ctrl-C raises ``KeyboardInterrupt`` after
-/// a step, and the simulation can be continued.
+/// The global interpreter lock is released during steps. Only one thread may use a simulation at a
+/// time, also to read it. Ctrl-C raises ``KeyboardInterrupt`` after a step, and the simulation can
+/// be continued.
 ///
 /// With `output`, steps end at the output times of the case as well. If nothing is controlled and
 /// no other times are asked for, the results are those of `Case.run`. Steps beyond the end of the
@@ -103,10 +114,34 @@ pub struct PySimulation {
     failed: Option<String>,
 }
 
+/// Message of a simulation that another thread uses.
+const IN_USE: &str = "the simulation is in use by another call, such as a step in another thread: \
+                      only one thread may use a simulation at a time";
+
+/// Returns a simulation to be read; refuses while another thread changes it.
+fn reading<'py>(slf: &Bound<'py, PySimulation>) -> PyResult<PyRef<'py, PySimulation>> {
+    slf.try_borrow().map_err(|_| PyRuntimeError::new_err(IN_USE))
+}
+
+/// Returns a simulation to be changed; refuses while another thread uses it.
+fn changing<'py>(slf: &Bound<'py, PySimulation>) -> PyResult<PyRefMut<'py, PySimulation>> {
+    slf.try_borrow_mut().map_err(|_| PyRuntimeError::new_err(IN_USE))
+}
+
+/// Returns the watch of the stop condition of a simulation in memory, if the case has one.
+fn watch(case: &Case, sim: &Simulation) -> Option<Watch> {
+    case.plan.stop.map(|stop| Watch::new(&case.setup, sim, Some(stop)))
+}
+
 impl PySimulation {
     /// Refuses a change of the fields that arrays show, or after a failed step.
     fn may_change(&self) -> PyResult<()> {
         self.may_continue()?;
+        self.has_no_views()
+    }
+
+    /// Refuses a change of the fields that arrays show.
+    fn has_no_views(&self) -> PyResult<()> {
         match self.views.load(Ordering::Acquire) {
             0 => Ok(()),
             count => {
@@ -210,7 +245,8 @@ impl PySimulation {
         force: bool,
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
-        let threads = threads::resolve(py, threads.map_or(given.threads, usize::from))?;
+        let threads = case.get().threads(py, threads.as_ref())?;
+        warn(py, given.estimate(threads).warnings)?;
         let pool = threads::pool(threads)?;
         let (sim, recording) = match &output {
             Some(folder) => {
@@ -227,8 +263,7 @@ impl PySimulation {
                 (py.detach(|| pool.install(|| Simulation::new(setup))).raise()?, None)
             }
         };
-        let in_memory = given.plan.stop.filter(|_| recording.is_none());
-        let watch = in_memory.map(|stop| Watch::new(&given.setup, &sim, Some(stop)));
+        let watch = if recording.is_none() { watch(given, &sim) } else { None };
         let (views, closed_by) = (Arc::default(), None);
         let failed = None;
         Ok(PySimulation { sim, recording, watch, closed_by, output, case, pool, views, failed })
@@ -253,15 +288,16 @@ impl PySimulation {
     /// BufferError
     ///     An array shows the fields of the present step.
     #[pyo3(signature = (horizon = None))]
-    fn step(&mut self, py: Python<'_>, horizon: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
+    fn step(slf: &Bound<'_, Self>, horizon: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
         let horizon =
             horizon.map_or(Ok(f64::INFINITY), |given| quantity::<Time>("horizon", given))?;
         if horizon <= 0.0 {
             return Err(input(format!("horizon: found {horizon} s; expected a positive time")));
         }
         let mut steps = std::iter::once(horizon);
-        self.advance(py, |_, _| steps.next())?;
-        Ok(self.sim.time_step())
+        let mut this = changing(slf)?;
+        this.advance(slf.py(), |_, _| steps.next())?;
+        Ok(this.sim.time_step())
     }
 
     /// Advance to a time, in steps of which the last ends there.
@@ -275,20 +311,21 @@ impl PySimulation {
     /// ------
     /// SolverError, BufferError
     ///     As in `step`.
-    fn advance_to(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn advance_to(slf: &Bound<'_, Self>, time: &Bound<'_, PyAny>) -> PyResult<()> {
         let until = quantity::<Time>("time", time)?;
-        self.advance(py, |sim, _| left(sim, until))
+        changing(slf)?.advance(slf.py(), |sim, _| left(sim, until))
     }
 
     /// Advances to a time [s], or until the stop condition of the case holds.
-    fn _advance(&mut self, py: Python<'_>, time: f64) -> PyResult<()> {
-        self.advance(py, |sim, stopped| if stopped { None } else { left(sim, time) })
+    fn _advance(slf: &Bound<'_, Self>, time: f64) -> PyResult<()> {
+        let horizon = |sim: &_, stopped| if stopped { None } else { left(sim, time) };
+        changing(slf)?.advance(slf.py(), horizon)
     }
 
     /// Whether the stop condition of the case holds.
     #[getter]
-    fn _stopped(&self) -> bool {
-        self.stopped().is_some()
+    fn _stopped(slf: &Bound<'_, Self>) -> PyResult<bool> {
+        Ok(reading(slf)?.stopped().is_some())
     }
 
     /// Iterate over states at regular times, until the end or the stop condition of the case.
@@ -307,6 +344,11 @@ impl PySimulation {
     /// State
     ///     Copy of the motion of the grains; the first is the present state. If the stop condition
     ///     of the case (``time.stop``) holds, the state of that step is the last.
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     `until` is before the present time.
     #[pyo3(signature = (until = None, every = None, *, progress = None))]
     fn run<'py>(
         slf: &Bound<'py, Self>,
@@ -315,12 +357,20 @@ impl PySimulation {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
-        let (end, interval) = {
-            let this = slf.try_borrow()?;
+        check_progress(py, progress)?;
+        let (now, end, interval) = {
+            let this = reading(slf)?;
             let plan = &this.case.get().case.plan;
-            (plan.end, plan.tables)
+            (this.sim.time(), plan.end, plan.tables)
         };
         let end = until.map_or(Ok(end), |given| quantity::<Time>("until", given))?;
+        if until.is_some() && end < now * (1.0 - SAME_TIME) {
+            return Err(input(format!(
+                "until: found {}, which is before the present time, {}",
+                seconds(end, "s"),
+                seconds(now, "s")
+            )));
+        }
         let interval = match every {
             Some(given) => quantity::<Time>("every", given)?,
             None if interval > 0.0 => interval,
@@ -343,39 +393,41 @@ impl PySimulation {
 
     /// The case.
     #[getter]
-    fn case(&self, py: Python<'_>) -> Py<PyCase> {
-        self.case.clone_ref(py)
+    fn case(slf: &Bound<'_, Self>) -> PyResult<Py<PyCase>> {
+        Ok(reading(slf)?.case.clone_ref(slf.py()))
     }
     /// Simulated time [s].
     #[getter]
-    fn time(&self) -> f64 {
-        self.sim.time()
+    fn time(slf: &Bound<'_, Self>) -> PyResult<f64> {
+        Ok(reading(slf)?.sim.time())
     }
     /// Number of steps taken.
     #[getter]
-    fn steps(&self) -> u64 {
-        self.sim.steps()
+    fn steps(slf: &Bound<'_, Self>) -> PyResult<u64> {
+        Ok(reading(slf)?.sim.steps())
     }
     /// Length of the last step [s]; zero before the first.
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.sim.time_step()
+    fn time_step(slf: &Bound<'_, Self>) -> PyResult<f64> {
+        Ok(reading(slf)?.sim.time_step())
     }
     /// Reason why the run is over: "end" at the end time of the case, or its stop condition
     /// "landing", "rest" or "separation"; None before. Steps are possible after a stop condition.
     #[getter]
-    fn ended(&self) -> Option<String> {
-        let end = self.case.get().case.plan.at_end(self.sim.time()).then_some(EndReason::End);
-        end.or_else(|| self.stopped()).map(|why| why.to_string())
+    fn ended(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
+        let this = reading(slf)?;
+        let end = this.case.get().case.plan.at_end(this.sim.time()).then_some(EndReason::End);
+        Ok(end.or_else(|| this.stopped()).map(|why| why.to_string()))
     }
     /// Threads of the simulation.
     #[getter]
-    fn threads(&self) -> usize {
-        self.pool.current_num_threads()
+    fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(reading(slf)?.pool.current_num_threads())
     }
-    fn __repr__(&self) -> String {
-        let (time, steps) = (self.sim.time(), self.sim.steps());
-        let grains = number_of_grains(self.sim.grains().len());
-        format!("Simulation({grains}, t = {time:.6} s, step {steps})")
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let this = reading(slf)?;
+        let (time, steps) = (this.sim.time(), this.sim.steps());
+        let grains = number_of_grains(this.sim.grains().len());
+        Ok(format!("Simulation({grains}, t = {time:.6} s, step {steps})"))
     }
 }

@@ -9,7 +9,7 @@ use grainwake_solver::sim::{Simulation, StepError};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use super::PySimulation;
+use super::{PySimulation, changing, reading};
 use crate::error::{IntoException, Raise, input, warn};
 use crate::running::{command, existing};
 
@@ -104,8 +104,8 @@ impl PySimulation {
 impl PySimulation {
     /// Run folder; None without one.
     #[getter]
-    fn output(&self) -> Option<PathBuf> {
-        self.output.clone()
+    fn output(slf: &Bound<'_, Self>) -> PyResult<Option<PathBuf>> {
+        Ok(reading(slf)?.output.clone())
     }
 
     /// Write a checkpoint into the run folder, from which ``resume=True`` continues.
@@ -116,11 +116,12 @@ impl PySimulation {
     ///     The simulation has no run folder, or the folder is closed.
     /// OSError
     ///     Writing failed.
-    fn checkpoint(&mut self, py: Python<'_>) -> PyResult<()> {
-        self.may_write()?;
-        let (pool, sim) = (self.pool.clone(), &self.sim);
-        let Some(recording) = &mut self.recording else { return Ok(()) };
-        py.detach(|| pool.install(|| recording.checkpoint(sim))).raise()
+    fn checkpoint(slf: &Bound<'_, Self>) -> PyResult<()> {
+        let mut this = changing(slf)?;
+        this.may_write()?;
+        let PySimulation { pool, sim, recording, .. } = &mut *this;
+        let Some(recording) = recording else { return Ok(()) };
+        slf.py().detach(|| pool.install(|| recording.checkpoint(sim))).raise()
     }
 
     /// Write the last outputs and the summary, close the run folder, and draw the report.
@@ -149,13 +150,16 @@ impl PySimulation {
     /// The simulation can still be read, but not stepped. A run that is finished before the end of
     /// the case is continued by ``resume=True``.
     #[pyo3(signature = (*, report = true))]
-    fn finish<'py>(&mut self, py: Python<'py>, report: bool) -> PyResult<Bound<'py, PyAny>> {
-        self.may_write()?;
-        let (pool, sim, folder) = (self.pool.clone(), &self.sim, self.output.clone());
-        if let Some(recording) = self.recording.take() {
-            self.closed_by = recording.stopped(sim);
+    fn finish<'py>(slf: &Bound<'py, Self>, report: bool) -> PyResult<Bound<'py, PyAny>> {
+        let (py, mut this) = (slf.py(), changing(slf)?);
+        this.may_write()?;
+        let folder = this.output.clone();
+        let PySimulation { pool, sim, recording, closed_by, .. } = &mut *this;
+        if let Some(recording) = recording.take() {
+            *closed_by = recording.stopped(sim);
             py.detach(|| pool.install(|| recording.finish(sim))).raise()?;
         }
+        drop(this);
         if let (true, Some(folder)) = (report, &folder) {
             py.detach(|| grainwake_report::render(folder)).raise()?;
         }
@@ -168,22 +172,22 @@ impl PySimulation {
 
     /// Finishes the run folder; after an exception, writes a checkpoint and closes it.
     fn __exit__(
-        &mut self,
-        py: Python<'_>,
+        slf: &Bound<'_, Self>,
         kind: &Bound<'_, PyAny>,
         _value: &Bound<'_, PyAny>,
         _traceback: &Bound<'_, PyAny>,
     ) -> PyResult<bool> {
-        if self.recording.is_none() {
+        if reading(slf)?.recording.is_none() {
             return Ok(false);
         }
         if kind.is_none() {
-            self.finish(py, true)?;
+            PySimulation::finish(slf, true)?;
             return Ok(false);
         }
-        let written = self.checkpoint(py);
-        self.closed_by = self.stopped();
-        self.recording = None;
+        let written = PySimulation::checkpoint(slf);
+        let mut this = changing(slf)?;
+        this.closed_by = this.stopped();
+        this.recording = None;
         written.map(|()| false)
     }
 }

@@ -1,22 +1,32 @@
 //! Motion of the grains, contacts and measures of the state.
 
 use glam::DVec3;
+use grainwake_formats::contacts::wall_code;
 use grainwake_solver::dem::{Contact, Grain, Partner};
+use grainwake_solver::math::Load;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::PySimulation;
-use crate::arrays::{numbers, rows, vectors};
+use super::{PySimulation, reading};
+use crate::arrays::{numbers, read_only, rows, vectors};
 
-impl PySimulation {
-    fn grain_vectors<'py>(
-        &self,
-        py: Python<'py>,
-        pick: fn(&Grain) -> DVec3,
-    ) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.grains().iter().map(pick))
-    }
+/// Returns one vector per grain.
+fn grain_vectors<'py>(
+    slf: &Bound<'py, PySimulation>,
+    pick: fn(&Grain) -> DVec3,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let this = reading(slf)?;
+    Ok(read_only(vectors(slf.py(), this.sim.grains().iter().map(pick))))
+}
+
+/// Returns one vector per grain of the mean hydrodynamic loads.
+fn load_vectors<'py>(
+    slf: &Bound<'py, PySimulation>,
+    pick: fn(&Load) -> DVec3,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let this = reading(slf)?;
+    Ok(read_only(vectors(slf.py(), this.sim.loads().iter().map(pick))))
 }
 
 #[pymethods]
@@ -28,8 +38,10 @@ impl PySimulation {
     /// dict
     ///     max_divergence [1/s], max_velocity [m/s], cfl, slip [m/s], fluid_kinetic_energy [J],
     ///     grain_kinetic_energy [J], momentum [kg m/s], momentum_residual (relative).
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let d = py.detach(|| self.pool.install(|| self.sim.diagnostics()));
+    fn diagnostics<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let (py, this) = (slf.py(), reading(slf)?);
+        let PySimulation { pool, sim, .. } = &*this;
+        let d = py.detach(|| pool.install(|| sim.diagnostics()));
         let dict = PyDict::new(py);
         dict.set_item("max_divergence", d.max_divergence)?;
         dict.set_item("max_velocity", d.max_velocity)?;
@@ -47,62 +59,73 @@ impl PySimulation {
     /// Returns
     /// -------
     /// dict of ndarray
-    ///     grain (n,), partner (n,) with -1 for a wall, overlap (n,) [m], force (n, 3) [N] on
-    ///     `grain`, point (n, 3) [m] and normal (n, 3).
-    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = self.sim.contacts();
+    ///     grain (n,), partner (n,), overlap (n,) [m], force (n, 3) [N] on `grain`, point (n, 3)
+    ///     [m] and normal (n, 3); read-only copies. A negative partner is a wall, as in
+    ///     `RunFolder.contacts`: -1 lower x, -2 upper x, -3 lower y, -4 upper y, -5 lower z,
+    ///     -6 upper z.
+    fn contacts<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let (py, this) = (slf.py(), reading(slf)?);
+        let all = this.sim.contacts();
         let partner = |contact: &Contact| match contact.partner {
             Partner::Grain(index) => index as i64,
-            Partner::Wall { .. } => -1,
+            Partner::Wall { axis, side } => wall_code(axis, side),
         };
+        let of_each = |pick: fn(&Contact) -> DVec3| read_only(vectors(py, all.iter().map(pick)));
+        let index = |values: Vec<i64>| read_only(numbers(py, values));
         let dict = PyDict::new(py);
-        dict.set_item("grain", numbers(py, all.iter().map(|c| c.grain as i64).collect()))?;
-        dict.set_item("partner", numbers(py, all.iter().map(partner).collect()))?;
-        dict.set_item("overlap", numbers(py, all.iter().map(|c| c.overlap).collect()))?;
-        dict.set_item("force", vectors(py, all.iter().map(|c| c.load.force)))?;
-        dict.set_item("point", vectors(py, all.iter().map(|c| c.point)))?;
-        dict.set_item("normal", vectors(py, all.iter().map(|c| c.normal)))?;
+        dict.set_item("grain", index(all.iter().map(|c| c.grain as i64).collect()))?;
+        dict.set_item("partner", index(all.iter().map(partner).collect()))?;
+        let overlaps = all.iter().map(|c| c.overlap).collect();
+        dict.set_item("overlap", read_only(numbers::<f64>(py, overlaps)))?;
+        dict.set_item("force", of_each(|c| c.load.force))?;
+        dict.set_item("point", of_each(|c| c.point))?;
+        dict.set_item("normal", of_each(|c| c.normal))?;
         Ok(dict)
     }
 
-    /// Centroids [m], shape (n, 3); a copy. A grain that has left the box is at infinity.
+    /// Centroids [m], shape (n, 3); a read-only copy. A grain that has left the box is at infinity.
     #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.pose.position)
+    fn positions<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        grain_vectors(slf, |grain| grain.pose.position)
     }
-    /// Quaternions (w, x, y, z) from the body frame to the space frame, shape (n, 4); a copy.
+    /// Quaternions (w, x, y, z) from the body frame to the space frame, shape (n, 4); a read-only
+    /// copy.
     #[getter]
-    fn orientations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let turns = self.sim.grains().iter().map(|grain| {
+    fn orientations<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let this = reading(slf)?;
+        let turns = this.sim.grains().iter().map(|grain| {
             let q = grain.pose.orientation;
             [q.w, q.x, q.y, q.z]
         });
-        rows(py, turns)
+        Ok(read_only(rows(slf.py(), turns)))
     }
-    /// Velocities of the centroids [m/s], shape (n, 3); a copy.
+    /// Velocities of the centroids [m/s], shape (n, 3); a read-only copy.
     #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.velocity)
+    fn velocities<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        grain_vectors(slf, |grain| grain.velocity)
     }
-    /// Angular velocities in the space frame [rad/s], shape (n, 3); a copy.
+    /// Angular velocities in the space frame [rad/s], shape (n, 3); a read-only copy.
     #[getter]
-    fn angular_velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        self.grain_vectors(py, |grain| grain.angular_velocity)
+    fn angular_velocities<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        grain_vectors(slf, |grain| grain.angular_velocity)
     }
-    /// Mean hydrodynamic forces over the last step [N], without buoyancy, shape (n, 3); a copy.
-    #[getter]
-    fn forces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.loads().iter().map(|load| load.force))
-    }
-    /// Mean hydrodynamic torques about the centroids over the last step [N m], shape (n, 3); a
+    /// Mean hydrodynamic forces over the last step [N], without buoyancy, shape (n, 3); a read-only
     /// copy.
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        vectors(py, self.sim.loads().iter().map(|load| load.torque))
+    fn forces<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        load_vectors(slf, |load| load.force)
     }
-    /// Masses of the grains [kg], shape (n,).
+    /// Mean hydrodynamic torques about the centroids over the last step [N m], shape (n, 3); a
+    /// read-only copy.
     #[getter]
-    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        numbers(py, self.sim.grains().iter().map(|grain| grain.mass()).collect())
+    fn torques<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        load_vectors(slf, |load| load.torque)
+    }
+    /// Masses of the grains [kg], shape (n,); a read-only copy.
+    #[getter]
+    fn masses<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let this = reading(slf)?;
+        let masses = this.sim.grains().iter().map(|grain| grain.mass()).collect();
+        Ok(read_only(numbers(slf.py(), masses)))
     }
 }

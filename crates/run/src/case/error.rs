@@ -56,6 +56,17 @@ impl Problem {
         self.excerpt = Some(Box::new(Excerpt { source, label: label.into(), span }));
         self
     }
+    /// Returns the problem with other words in its message, its remedy and the name of its source.
+    #[must_use]
+    pub fn reworded(mut self, words: impl Fn(&str) -> String) -> Problem {
+        self.message = words(&self.message);
+        self.help = self.help.as_deref().map(&words);
+        if let Some(excerpt) = &mut self.excerpt {
+            let text = excerpt.source.inner().clone();
+            excerpt.source = NamedSource::new(words(excerpt.source.name()), text);
+        }
+        self
+    }
     /// Returns one line per problem.
     pub fn list(problems: &[Problem]) -> String {
         problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")

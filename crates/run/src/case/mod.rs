@@ -43,7 +43,7 @@ use std::path::Path;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::{Job, RunPlan};
+use crate::{Job, RESOLVED, RunPlan};
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_solver::sim::Setup;
 
@@ -59,6 +59,8 @@ pub use source::Source;
 pub use suggest::{did_you_mean, nearest};
 
 use raw::{RawCase, RawExpect, RawRun};
+use shapes::Library;
+use validate::Validated;
 
 /// A case that can be run.
 #[derive(Debug)]
@@ -110,7 +112,25 @@ impl Case {
         overrides: &[String],
     ) -> Result<Case, CaseError> {
         let (source, raw) = source::Source::parse(name, text, overrides)?;
-        let validated = validate::validate(&source, raw, folder)?;
+        let validated = validate::validate(&source, raw, Library::new(folder))?;
+        Case::of(source, validated)
+    }
+
+    /// Builds a case from `resolved` and `shapes` of another one, which it equals.
+    ///
+    /// # Errors
+    /// [`CaseError`] if they are not those of a case.
+    pub fn from_resolved(resolved: &str, shapes: Vec<ShapeFile>) -> Result<Case, CaseError> {
+        let (source, raw) = source::Source::parse(RESOLVED, resolved, &[])?;
+        let library = Library::of_files(&shapes)
+            .map_err(|(message, help)| CaseError::from(Problem::new(message).help(help)))?;
+        let mut validated = validate::validate(&source, raw, library)?;
+        // The digest depends on their order.
+        validated.shapes = shapes;
+        Case::of(source, validated)
+    }
+
+    fn of(source: Source, validated: Validated) -> Result<Case, CaseError> {
         let resolved = write(&validated.resolved)?;
         let digest = digest(&validated.resolved, &validated.shapes)?;
         Ok(Case {
@@ -209,7 +229,33 @@ fn digest(resolved: &RawCase, shapes: &[ShapeFile]) -> Result<String, CaseError>
 
 #[cfg(test)]
 mod tests {
+    use grainwake_shape::Shape;
+
     use super::*;
+
+    /// Grain files of two folders: their order differs from that of their names.
+    #[test]
+    fn a_case_is_rebuilt_from_its_resolved_text_and_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut grains = String::new();
+        for (name, z) in [("b/one", 0.25), ("a/two", 0.75)] {
+            let file = folder.path().join(format!("{name}.grain"));
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            Shape::sphere(0.1 * (1.0 + z), 100).save(&file).unwrap();
+            grains += &format!(
+                "[[grain]]\nfile = \"{name}.grain\"\ndensity = 2500\nposition = [0.5, 0.5, {z}]\n"
+            );
+        }
+        let text =
+            format!("[domain]\nsize = [1, 1, 1]\ncell_size = 0.1\n[time]\nend = 1\n{grains}");
+        let case = Case::parse(&text, "case", folder.path(), &["time.end=2 s".into()]).unwrap();
+        let names: Vec<&str> = case.shapes.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["shapes/two.grain", "shapes/one.grain"]);
+        let again = Case::from_resolved(&case.resolved, case.shapes.clone()).unwrap();
+        assert_eq!((&again.resolved, &again.digest), (&case.resolved, &case.digest));
+        assert_eq!((again.plan.end, again.setup.grains.len()), (2.0, 2));
+        assert!(Case::from_resolved(&case.resolved, Vec::new()).is_err());
+    }
 
     #[test]
     fn the_resolved_case_is_written_as_by_the_plain_function() {

@@ -33,6 +33,16 @@ impl<'a> Library<'a> {
         Library { folder, files: BTreeMap::new(), built: BTreeMap::new() }
     }
 
+    /// Returns a library of these files alone, by name.
+    pub fn of_files(files: &[ShapeFile]) -> Result<Library<'a>, Refusal> {
+        let mut library = Library::new(Path::new(""));
+        for file in files {
+            let shape = library.shape(&file.1, Path::new(&file.0))?;
+            library.files.insert(PathBuf::from(&file.0), (file.clone(), shape));
+        }
+        Ok(library)
+    }
+
     /// Returns the path of a file that the case names.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
@@ -57,15 +67,7 @@ impl<'a> Library<'a> {
             ),
             _ => (format!("cannot read {}: {error}", path.display()), "check the file and its permissions".to_string()),
         })?;
-        // A copy of a file under another name has the same shape.
-        let copy = self.files.values().find(|((_, known), _)| **known == bytes);
-        let shape = match copy {
-            Some((_, shape)) => shape.clone(),
-            None => Arc::new(Shape::from_bytes(&bytes, &path).map_err(|error| {
-                let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
-                (error.to_string(), help.to_string())
-            })?),
-        };
+        let shape = self.shape(&bytes, &path)?;
         let stem =
             path.file_stem().map_or_else(|| "grain".into(), |s| s.to_string_lossy().into_owned());
         let taken = |candidate: &str| self.files.values().any(|((name, _), _)| name == candidate);
@@ -77,6 +79,20 @@ impl<'a> Library<'a> {
         }
         self.files.insert(path, ((name.clone(), Arc::new(bytes)), shape.clone()));
         Ok((shape, name))
+    }
+
+    /// Returns the shape of the contents of a file. A copy of a file under another name has the
+    /// same shape.
+    fn shape(&self, bytes: &[u8], path: &Path) -> Result<Arc<Shape>, Refusal> {
+        let copy = self.files.values().find(|((_, known), _)| known.as_slice() == bytes);
+        if let Some((_, shape)) = copy {
+            return Ok(shape.clone());
+        }
+        let shape = Shape::from_bytes(bytes, path).map_err(|error| {
+            let help = "a case takes .grain files; make one with `grainwake grain from-scan`, `from-mesh` or `make`";
+            (error.to_string(), help.to_string())
+        })?;
+        Ok(Arc::new(shape))
     }
 
     /// Returns a closed form with this number of surface nodes.

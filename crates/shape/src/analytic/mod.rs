@@ -10,7 +10,7 @@ pub(crate) use ellipsoid::distance as ellipsoid_distance;
 pub use ellipsoid::ellipsoid;
 pub use solids::{capsule, cylinder, rounded_box, superquadric};
 
-use crate::error::{Result, size, within};
+use crate::error::{Result, check_length, within};
 use crate::{Shape, ShapeOptions};
 
 /// Default node count of a sphere: one node per (diameter / 20)^2 of surface.
@@ -18,7 +18,7 @@ const SPHERE_NODES: usize = 1257;
 
 /// Builds a sphere of `radius` [m].
 pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
-    size("radius", radius)?;
+    check_length("radius", radius)?;
     let nodes = options.nodes.unwrap_or(SPHERE_NODES);
     within("nodes", nodes as f64, 1.0..=1e6, "must be 1 to 1000000")?;
     Ok(Shape::sphere(radius, nodes))
@@ -27,7 +27,7 @@ pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
 /// Sorts three lengths in descending order, so that x, y and z are the principal axes in order.
 fn sorted(names: [&'static str; 3], lengths: [f64; 3]) -> Result<[f64; 3]> {
     for (name, length) in names.into_iter().zip(lengths) {
-        size(name, length)?;
+        check_length(name, length)?;
     }
     let mut lengths = lengths;
     lengths.sort_by(|p, q| q.total_cmp(p));

@@ -2,7 +2,7 @@
 
 use super::sorted;
 use crate::assemble::{Body, assemble};
-use crate::error::{Result, size, within};
+use crate::error::{Result, check_length, within};
 use crate::mesh;
 use crate::provenance::Provenance;
 use crate::roundness::Surface;
@@ -56,8 +56,8 @@ pub fn rounded_box(
 /// Builds a circular cylinder of `radius` and `height` [m]. Its axis is x for a rod and z for a
 /// disc (height below sqrt(3) radii), following the order of the principal moments.
 pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
-    size("radius", radius)?;
-    size("height", height)?;
+    check_length("radius", radius)?;
+    check_length("height", height)?;
     let long = height >= 3f64.sqrt() * radius;
     let half = 0.5 * height;
     let provenance = Provenance::new("analytic")
@@ -84,8 +84,8 @@ pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shap
 /// Builds a cylinder of `radius` and `height` [m] along x with a hemisphere at either end (total
 /// length `height` + 2 `radius`).
 pub fn capsule(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
-    size("radius", radius)?;
-    size("height", height)?;
+    check_length("radius", radius)?;
+    check_length("height", height)?;
     let half = 0.5 * height;
     let extent = DVec3::new(half + radius, radius, radius);
     let provenance = Provenance::new("analytic")
@@ -119,7 +119,7 @@ pub fn superquadric(
     options: &ShapeOptions,
 ) -> Result<Shape> {
     for (name, length) in ["a", "b", "c"].into_iter().zip(semi_axes) {
-        size(name, length)?;
+        check_length(name, length)?;
     }
     for (name, value) in [("e1", e1), ("e2", e2)] {
         let reason = "must lie between 0.1 and 2 (convex, and not too sharp to mesh)";

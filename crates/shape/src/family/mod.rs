@@ -11,7 +11,7 @@ mod ball_intersection;
 mod stone;
 
 use crate::assemble::{Body, assemble};
-use crate::error::{Defect, Result, ShapeError, size, within};
+use crate::error::{Defect, Result, ShapeError, check_length, within};
 use crate::provenance::Provenance;
 use crate::random::Random;
 use crate::roundness::Surface;
@@ -55,7 +55,7 @@ impl FamilyTarget {
         let least = self.sphericity.powi(3) - 1e-6;
         let reason = "must be no less than the cube of the sphericity";
         within("flatness", self.flatness, least..=1.0, reason)?;
-        size("equivalent diameter", self.equivalent_diameter)
+        check_length("equivalent diameter", self.equivalent_diameter)
     }
 }
 

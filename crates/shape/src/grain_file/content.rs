@@ -1,7 +1,7 @@
 //! Content of a `.grain` file: encoding and decoding of a shape, and the hash of its geometry.
 
 use super::levels;
-use crate::error::size;
+use crate::error::check_length;
 use crate::field::SampledField;
 use crate::limits::hex;
 use crate::morphology::Morphology;
@@ -164,7 +164,7 @@ pub(super) fn decode(from: &mut Decoder, version: u32) -> io::Result<Shape> {
 /// Refuses sizes that contradict each other, which a damaged file with a correct checksum may hold.
 fn check(shape: &Shape) -> io::Result<()> {
     let radius = shape.bounding_radius;
-    size("bounding radius", radius).map_err(|error| invalid(error.to_string()))?;
+    check_length("bounding radius", radius).map_err(|error| invalid(error.to_string()))?;
     // Rounding, and nodes and bounds that lie a little outside the surface.
     let limit = 1.1 * radius;
     let is_length = |length: f64| length > 0.0 && length <= 2.0 * limit;

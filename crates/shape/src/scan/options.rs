@@ -2,7 +2,7 @@
 
 use super::Threshold;
 use crate::assemble::ShapeOptions;
-use crate::error::{Result, size, within};
+use crate::error::{Result, ShapeError, check_length, within};
 
 /// Options for converting a volume to shapes.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,9 +79,16 @@ impl ScanOptions {
         self.split || self.separate.is_some()
     }
 
-    /// Checks the numeric options.
-    pub(super) fn check(&self) -> Result<()> {
-        size("voxel size", self.voxel)?;
+    /// Checks the options before a volume is read.
+    ///
+    /// # Errors
+    /// [`ShapeError::BadParameter`] for a value out of range,
+    /// [`ShapeError::MedianWithoutThreshold`].
+    pub fn check(&self) -> Result<()> {
+        if self.median && self.threshold.is_none() {
+            return Err(ShapeError::MedianWithoutThreshold);
+        }
+        check_length("voxel size", self.voxel)?;
         self.shape.check()?;
         if let Some(smoothing) = self.smoothing {
             let reason = "must lie between 0.5 and 5 voxels";

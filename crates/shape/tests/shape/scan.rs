@@ -160,7 +160,9 @@ fn hopeless_volumes_are_refused() {
         assert!(matches!(run(speck.clone(), &bad), Err(ShapeError::BadParameter { .. })));
     }
     let bad = ScanOptions { smoothing: Some(f64::NAN), ..options() };
-    assert!(matches!(run(speck, &bad), Err(ShapeError::BadParameter { .. })));
+    assert!(matches!(run(speck.clone(), &bad), Err(ShapeError::BadParameter { .. })));
+    let bad = ScanOptions { median: true, ..options() };
+    assert!(matches!(run(speck, &bad), Err(ShapeError::MedianWithoutThreshold)));
     assert!(Volume::from_labels([10, 10, 11], vec![0; 1000]).is_err());
     let grey = Volume { dims: [2, 1, 1], voxels: Voxels::Grey(vec![0.1, 0.2]) };
     let error = only(&grey, &options()).unwrap_err();

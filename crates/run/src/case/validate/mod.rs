@@ -14,8 +14,6 @@ mod poses;
 mod probes;
 mod scales;
 
-use std::path::Path;
-
 use self::arrangement::Placement;
 use self::check::Checker;
 use self::grains::{Grains, Vertical};
@@ -39,14 +37,14 @@ pub(super) struct Validated {
     pub resolved: RawCase,
 }
 
-/// Validates a case; shape files are relative to `folder`.
+/// Validates a case with its library of shapes.
 pub(super) fn validate(
     source: &Source,
     raw: RawCase,
-    folder: &Path,
+    library: Library,
 ) -> Result<Validated, CaseError> {
     let mut check = Checker::new(source);
-    let validated = resolve(&mut check, raw, folder);
+    let validated = resolve(&mut check, raw, library);
     match validated.filter(|_| check.problems.is_empty()) {
         Some(validated) => {
             let checked = validated.setup.validate();
@@ -58,7 +56,7 @@ pub(super) fn validate(
 }
 
 /// Returns the validated case, or `None` after a problem that hides others.
-fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Validated> {
+fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Validated> {
     let dry = raw.fluid.is_none();
     let mut prescription = Prescription::default();
     let fluid = (raw.fluid.as_mut()).and_then(|raw| physics::fluid(check, raw, &mut prescription));
@@ -67,7 +65,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let gravity = raw.gravity.si;
     plan::check_threads(check, &raw.run);
 
-    let mut grains = Grains::new(Library::new(folder), Vertical::of(gravity));
+    let mut grains = Grains::new(library, Vertical::of(gravity));
     let fluid_density = fluid.map(|fluid| fluid.density);
     for grain in &raw.grain {
         let placement = Placement::of(check, grain, grains.vertical.axis);
