@@ -3,7 +3,7 @@
 use glam::DVec3;
 use grainwake_formats::contacts::wall_code;
 use grainwake_solver::dem::{Contact, Grain, Partner};
-use grainwake_solver::math::Load;
+use grainwake_solver::math::{Load, RigidVelocity};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,6 +18,16 @@ fn grain_vectors<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let this = reading(slf)?;
     Ok(read_only(vectors(slf.py(), this.sim.grains().iter().map(pick))))
+}
+
+/// Returns one vector per grain of the velocities with which the grains move.
+fn velocity_vectors<'py>(
+    slf: &Bound<'py, PySimulation>,
+    pick: fn(RigidVelocity) -> DVec3,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let this = reading(slf)?;
+    let velocities = (0..this.sim.grains().len()).map(|grain| this.sim.grain_velocity(grain));
+    Ok(read_only(vectors(slf.py(), velocities.map(pick))))
 }
 
 /// Returns one vector per grain of the mean hydrodynamic loads.
@@ -102,12 +112,12 @@ impl PySimulation {
     /// Velocities of the centroids [m/s], shape (n, 3); a read-only copy.
     #[getter]
     fn velocities<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        grain_vectors(slf, |grain| grain.velocity)
+        velocity_vectors(slf, |velocity| velocity.linear)
     }
     /// Angular velocities in the space frame [rad/s], shape (n, 3); a read-only copy.
     #[getter]
     fn angular_velocities<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        grain_vectors(slf, |grain| grain.angular_velocity)
+        velocity_vectors(slf, |velocity| velocity.angular)
     }
     /// Mean hydrodynamic forces over the last step [N], without buoyancy, shape (n, 3); a read-only
     /// copy.
