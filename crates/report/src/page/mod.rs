@@ -53,7 +53,7 @@ fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
 /// Returns one or two sentences with the main result and the extent of the run.
 fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
     let result = match features.kind {
-        RunKind::Pair => pair_sentence(features),
+        RunKind::Pair => pair_sentence(run, features),
         RunKind::Single => single_sentence(run, features),
         RunKind::Many => format!("{} grains. ", run.moving().len()),
         RunKind::Flow => String::new(),
@@ -68,9 +68,12 @@ fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
     label(&format!("{result}The run covers {end} s of simulated time{wall}{reason}."))
 }
 
-fn pair_sentence(features: &RunFeatures) -> String {
+fn pair_sentence(run: &RunFolder, features: &RunFeatures) -> String {
     let Some(kiss) = features.kiss else {
-        return "The two grains did not touch. ".to_owned();
+        return match run.finished() {
+            true => "The two grains did not touch. ".to_owned(),
+            false => "The two grains have not touched so far. ".to_owned(),
+        };
     };
     let mut events = vec![(kiss.time, format!("kissed at {}", features.pair_event_text(kiss)))];
     let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
@@ -91,6 +94,12 @@ fn pair_sentence(features: &RunFeatures) -> String {
 }
 
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
+    if !run.has_curves() {
+        // A single row, that of the end, does not show the fastest motion.
+        let peak = run.peak_settling_speed().filter(|v| features.is_motion(run, *v));
+        let text = |v| format!("The largest settling speed was {} m/s. ", short(v));
+        return peak.map_or(String::new(), text);
+    }
     let velocities = run.grains.iter().flat_map(|h| &h.velocity).filter(|v| v.is_finite());
     let fastest = velocities.max_by(|a, b| a.length().total_cmp(&b.length()));
     match fastest.filter(|v| features.is_motion(run, v.length())) {

@@ -23,7 +23,7 @@ use super::error::{CaseError, Problem};
 use super::expect::Expectation;
 use super::located::Located;
 use super::raw::{RawCase, RawPlane};
-use super::shapes::{Library, ShapeFile};
+use super::shapes::{ClosedForms, Library, ShapeFile};
 use super::source::Source;
 use crate::RunPlan;
 use grainwake_solver::dem::Grain;
@@ -39,14 +39,15 @@ pub(super) struct Validated {
     pub resolved: RawCase,
 }
 
-/// Validates a case; shape files are relative to `folder`.
+/// Validates a case; shape files are relative to `folder`, and closed forms come from `shapes`.
 pub(super) fn validate(
     source: &Source,
     raw: RawCase,
     folder: &Path,
+    shapes: &ClosedForms,
 ) -> Result<Validated, CaseError> {
     let mut check = Checker::new(source);
-    let validated = resolve(&mut check, raw, folder);
+    let validated = resolve(&mut check, raw, folder, shapes);
     match validated.filter(|_| check.problems.is_empty()) {
         Some(validated) => {
             let checked = validated.setup.validate();
@@ -58,7 +59,12 @@ pub(super) fn validate(
 }
 
 /// Returns the validated case, or `None` after a problem that hides others.
-fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Validated> {
+fn resolve(
+    check: &mut Checker,
+    mut raw: RawCase,
+    folder: &Path,
+    shapes: &ClosedForms,
+) -> Option<Validated> {
     let dry = raw.fluid.is_none();
     let mut prescription = Prescription::default();
     let fluid = (raw.fluid.as_mut()).and_then(|raw| physics::fluid(check, raw, &mut prescription));
@@ -67,7 +73,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, folder: &Path) -> Option<Valid
     let gravity = raw.gravity.si;
     plan::check_threads(check, &raw.run);
 
-    let mut grains = Grains::new(Library::new(folder), Vertical::of(gravity));
+    let mut grains = Grains::new(Library::new(folder, shapes), Vertical::of(gravity));
     let fluid_density = fluid.map(|fluid| fluid.density);
     for grain in &raw.grain {
         let placement = Placement::of(check, grain, grains.vertical.axis);
