@@ -172,3 +172,41 @@ fn grains(case: &Case) -> String {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Table of a sphere that settles, with the given lengths and viscosity.
+    fn shown(scale: f64, cells: u32, viscosity: &str) -> String {
+        let size = 10.0 * scale;
+        let text = format!(
+            "[fluid]\ndensity = 1000\nviscosity = \"{viscosity}\"\n[domain]\n\
+             size = [{size}, {size}, {size}]\ncells = [{cells}, {cells}, {cells}]\n[[grain]]\n\
+             shape = {{ kind = \"sphere\", diameter = {scale} }}\nnodes = 200\ndensity = 1100\n\
+             position = [{0}, {0}, {0}]\n[time]\nend = \"1 s\"\n",
+            5.0 * scale
+        );
+        let case = Case::parse(&text, "case.toml", Path::new("."), &[]).unwrap();
+        table(&case, &case.estimate(1), 1)
+    }
+
+    #[test]
+    fn the_error_of_the_drag_is_an_upper_limit_with_the_stricter_number_of_cells() {
+        let slow = shown(2e-3, 80, "20 mPa s");
+        assert!(slow.contains("at most 2.0 %; at most 2 % from 8 cells\n"), "{slow}");
+        let fast = shown(4e-3, 80, "1 mPa s");
+        assert!(fast.contains("at most 5 % from ") && fast.contains(", 2 % from "), "{fast}");
+        assert!(!fast.contains("% expected"), "{fast}");
+    }
+
+    #[test]
+    fn lengths_have_the_unit_of_their_size() {
+        let metres = shown(1.5, 20, "2000 Pa s");
+        assert!(metres.contains("15 x 15 x 15 m\n"), "{metres}");
+        assert!(metres.contains("equivalent diameter 1.5 m\n"), "{metres}");
+        assert!(shown(2e-3, 80, "20 mPa s").contains("20 x 20 x 20 mm"));
+    }
+}

@@ -2,6 +2,7 @@
 
 mod tables;
 
+use grainwake_formats::events::EventKind;
 use grainwake_plot::{literal, plain};
 use maud::{Markup, html};
 use serde_json::Value;
@@ -9,7 +10,7 @@ use serde_json::Value;
 use crate::features::{RunFeatures, RunKind, short};
 use crate::files::WrittenFigure;
 use crate::html::{self, label, name_column, notice, number_column, section};
-use crate::phases::{Phase, PhaseKind};
+use crate::phases::{self, Phase, PhaseKind};
 use crate::run_folder::RunFolder;
 
 /// Saved 3-D page in a run folder, to which the report links.
@@ -80,6 +81,8 @@ fn pair_sentence(run: &RunFolder, features: &RunFeatures) -> String {
     if let Some(phase) = features.phases.iter().find(tumbling) {
         let text = format!("tumbled from {}", features.time_text(phase.start));
         events.push((phase.start, text));
+    } else if let Some(time) = late_tumble(run, features) {
+        events.push((time, format!("tumbled at {}", features.time_text(time))));
     }
     if let Some(separation) = features.separation {
         let text = format!("separated at {}", features.pair_event_text(separation));
@@ -91,6 +94,14 @@ fn pair_sentence(run: &RunFolder, features: &RunFeatures) -> String {
         last.insert_str(0, "and ");
     }
     format!("The two grains {}. ", texts.join(", "))
+}
+
+/// Returns the time of a tumble after the separation and before the landing [s].
+fn late_tumble(run: &RunFolder, features: &RunFeatures) -> Option<f64> {
+    let time = phases::first(&run.events, EventKind::Tumble)?;
+    let separated = |phase: &&Phase| phase.kind == PhaseKind::Separated;
+    let last = features.phases.iter().rfind(separated)?;
+    (last.start <= time && time <= last.end).then_some(time)
 }
 
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {

@@ -64,10 +64,13 @@ impl Outcome {
         estimate: Option<Estimate>,
         says: impl FnOnce(&Estimate) -> String,
     ) -> Outcome {
-        let says = estimate.as_ref().map_or_else(
-            || format!("{n} models or pairs of models have finished: too few for a test"),
-            says,
-        );
+        let untested = || match n {
+            _ if n > 0 && censored == n => {
+                format!("none of the {n} models or pairs of models has the event: no test")
+            }
+            _ => format!("{n} models or pairs of models with a value: too few for a test"),
+        };
+        let says = estimate.as_ref().map_or_else(untested, says);
         Outcome { n, censored, uninformative: 0, effect, claimed, estimate, says }
     }
 

@@ -224,16 +224,19 @@ fn draw_panel(
         let x = *parameter.coordinates.get(&o.model)?;
         Some((frame.px(x), frame.py(o.value)))
     };
-    // Models that differ only on this axis are joined; a model without the event has no point.
+    // Models that differ only on this axis are joined, except across one without the event.
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
-    for observation in all.iter().filter(|o| !o.censored) {
+    for observation in all {
         if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
+            let point = if observation.censored { (point.0, f64::NAN) } else { point };
             lines.entry(other_levels(&observation.levels, axis)).or_default().push(point);
         }
     }
     for line in lines.values_mut() {
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
-        drawing.line(line, "#b4b4b8", 0.7, None);
+        for part in line.split(|point| point.1.is_nan()).filter(|part| part.len() > 1) {
+            drawing.line(part, "#b4b4b8", 0.7, None);
+        }
     }
     for observation in all {
         let (Some((x, _)), Some(run)) = (at(observation), data.run(&observation.model)) else {
