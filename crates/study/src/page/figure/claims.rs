@@ -70,8 +70,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         .to_owned();
     let unbounded = |row: &Row| row.interval.iter().any(|end| end.is_infinite());
     if panels.iter().any(|(_, rows)| rows.iter().any(unbounded)) {
-        caption += " An arrow with ∞ is an end or an effect without bound: it contains models \
-                    without the event.";
+        caption += " Arrow with ∞: no bound on this side, because of models without the event; \
+                    without a dot the effect itself has none.";
     }
     Some(Figure::new("claims", "Claims with their effects", caption, drawing))
 }
@@ -144,8 +144,10 @@ fn axis(label: &str, rows: &[Row]) -> Axis {
     if low == high {
         (low, high) = (-1.0, 1.0);
     }
-    // An arrow does not hide a finite effect.
+    // Zero is inside the frame, and an arrow does not hide a finite effect.
     let room = 0.08 * (high - low);
+    low -= if low == 0.0 { room } else { 0.0 };
+    high += if high == 0.0 { room } else { 0.0 };
     let unbounded = |end: f64| rows.iter().any(|row| of_row(row).contains(&end));
     low -= if unbounded(f64::NEG_INFINITY) { room } else { 0.0 };
     high += if unbounded(f64::INFINITY) { room } else { 0.0 };
