@@ -179,10 +179,8 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     if let Some(rows) = &request.rows {
         caption += &format!(" Blocks: grains of equal {rows}.");
     }
-    if let Some(reference) = &layout.reference {
-        if !reference.censored {
-            caption += &format!(" Dashed line: {}.", text::literal(&reference.model));
-        }
+    if let Some(reference) = layout.reference.as_ref().filter(|o| !o.censored) {
+        caption += &format!(" Dashed line: {}.", text::literal(&reference.model));
     }
     caption += &match data.records.iter().map(|r| r.member).max() {
         None | Some(0) => " Each symbol is one run.".to_owned(),
