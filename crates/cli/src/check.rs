@@ -32,12 +32,13 @@ pub fn warnings(e: &Estimate) -> impl Iterator<Item = String> {
 
 fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     let mesh = &case.setup.mesh;
-    let [x, y, z] = (mesh.extent() * 1e3).to_array().map(short);
+    let (unit, factor) = length_unit(mesh.extent().max_element());
+    let [x, y, z] = (mesh.extent() * factor).to_array().map(short);
     let mut rows: Vec<(&str, String)> = Vec::new();
     if !case.title.is_empty() {
         rows.push(("case", case.title.clone()));
     }
-    rows.push(("box", format!("{x} x {y} x {z} mm")));
+    rows.push(("box", format!("{x} x {y} x {z} {unit}")));
     let [nx, ny, nz] = mesh.cells;
     rows.push(match case.setup.fluid {
         Some(_) => ("cells", format!("{nx} x {ny} x {nz} = {}", e.cells)),
@@ -57,8 +58,13 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.extend(with_unit("cells across shortest axis", shortest.map(|(_, thin)| thin), ""));
     if let Some((error, reynolds)) = e.drag_error.zip(e.largest_reynolds()) {
         let [five, two] = [0.05, 0.02].map(|error| cells_for_drag_error(error, reynolds));
-        let error = drag_error_text(error, 1);
-        let text = format!("{error} expected; at most 5 % from {five} cells, 2 % from {two}");
+        // The text of an error beyond the formula is no limit.
+        let text = match drag_error_text(error, 1) {
+            more if more.starts_with("more") => more,
+            limit => format!("at most {limit}"),
+        };
+        let looser = if five < two { format!("5 % from {five} cells, ") } else { String::new() };
+        let text = format!("{text}; at most {looser}2 % from {two} cells");
         rows.push(("error of the drag", text));
     }
     // For unequal grains the number refers to one of them.
@@ -69,9 +75,10 @@ fn table(case: &Case, e: &Estimate, threads: usize) -> String {
     rows.extend(with_unit("expected Reynolds number", e.reynolds, sphere));
     let faster = e.start_reynolds.filter(|re| *re > e.reynolds.unwrap_or(0.0));
     rows.extend(with_unit("Reynolds number at the start", faster, ""));
-    let speed = e.settling_speed_m_per_s.map(|v| 1e3 * v);
-    let unit = "mm/s (settling or rising)";
-    rows.extend(with_unit("expected speed", speed, unit));
+    let speed = e.settling_speed_m_per_s;
+    let (unit, factor) = if speed.is_some_and(|v| v >= 1.0) { ("m/s", 1.0) } else { ("mm/s", 1e3) };
+    let unit = format!("{unit} (settling or rising)");
+    rows.extend(with_unit("expected speed", speed.map(|v| factor * v), &unit));
     rows.extend(with_unit("blockage", e.blockage.map(|b| 100.0 * b), "%"));
     let contact = &case.setup.contact;
     rows.push(match contact.law {
@@ -133,6 +140,11 @@ fn short(value: f64) -> String {
     number(format!("{value:.3e}").parse().unwrap_or(value))
 }
 
+/// Returns the unit of lengths up to `size` [m], and the number of units per metre.
+fn length_unit(size: f64) -> (&'static str, f64) {
+    if size < 1.0 { ("mm", 1e3) } else { ("m", 1.0) }
+}
+
 /// Returns the least and the largest value of a positive property of the grains.
 fn range(case: &Case, property: fn(&Grain) -> f64) -> (f64, f64) {
     let values = case.setup.grains.iter().map(property);
@@ -146,13 +158,55 @@ fn differ(case: &Case) -> bool {
 }
 
 fn grains(case: &Case) -> String {
-    let (least, most) = range(case, |g| 1e3 * g.shape.equivalent_diameter());
+    let (least, most) = range(case, |g| g.shape.equivalent_diameter());
+    let (unit, factor) = length_unit(most);
+    let (least, most) = (factor * least, factor * most);
     match case.setup.grains.len() {
         0 => "none".into(),
-        n if most - least < 1e-9 * most => format!("{n}, equivalent diameter {} mm", short(most)),
+        n if most - least < 1e-9 * most => {
+            format!("{n}, equivalent diameter {} {unit}", short(most))
+        }
         n => {
             let [least, most] = [least, most].map(short);
-            format!("{n}, equivalent diameters {least} to {most} mm")
+            format!("{n}, equivalent diameters {least} to {most} {unit}")
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Table of a sphere that settles, with the given lengths and viscosity.
+    fn shown(scale: f64, cells: u32, viscosity: &str) -> String {
+        let size = 10.0 * scale;
+        let text = format!(
+            "[fluid]\ndensity = 1000\nviscosity = \"{viscosity}\"\n[domain]\n\
+             size = [{size}, {size}, {size}]\ncells = [{cells}, {cells}, {cells}]\n[[grain]]\n\
+             shape = {{ kind = \"sphere\", diameter = {scale} }}\nnodes = 200\ndensity = 1100\n\
+             position = [{0}, {0}, {0}]\n[time]\nend = \"1 s\"\n",
+            5.0 * scale
+        );
+        let case = Case::parse(&text, "case.toml", Path::new("."), &[]).unwrap();
+        table(&case, &case.estimate(1), 1)
+    }
+
+    #[test]
+    fn the_error_of_the_drag_is_an_upper_limit_with_the_stricter_number_of_cells() {
+        let slow = shown(2e-3, 80, "20 mPa s");
+        assert!(slow.contains("at most 2.0 %; at most 2 % from 8 cells\n"), "{slow}");
+        let fast = shown(4e-3, 80, "1 mPa s");
+        assert!(fast.contains("at most 5 % from ") && fast.contains(", 2 % from "), "{fast}");
+        assert!(!fast.contains("% expected"), "{fast}");
+    }
+
+    #[test]
+    fn lengths_have_the_unit_of_their_size() {
+        let metres = shown(1.5, 20, "2000 Pa s");
+        assert!(metres.contains("15 x 15 x 15 m\n"), "{metres}");
+        assert!(metres.contains("equivalent diameter 1.5 m\n"), "{metres}");
+        assert!(shown(2e-3, 80, "20 mPa s").contains("20 x 20 x 20 mm"));
     }
 }

@@ -130,7 +130,7 @@ fn describe(s: &Summary, wet: bool, out: &Path) -> String {
     }
     if let Some(pair) = &s.pair {
         lines.push(format!(
-            "kiss {}  tumbling {}  separation {}  role changes {}",
+            "kiss time {}  tumble time {}  separation time {}  role changes {}",
             time(pair.kiss_time_s),
             time(pair.tumble_time_s),
             time(pair.separation_time_s),

@@ -260,23 +260,23 @@ fn dry_run(
 /// Returns the table of the terminal.
 fn pretty(rows: &[&RunRecord]) -> Table {
     const PAIR: [(&str, &str); 8] = [
-        ("kiss", "kiss_time"),
-        ("contact", "contact_stage"),
-        ("tumble", "tumble_time"),
-        ("parted", "separation_time"),
-        ("landed", "landing_time"),
+        ("kiss time", "kiss_time"),
+        ("contact stage", "contact_stage"),
+        ("tumble time", "tumble_time"),
+        ("separation time", "separation_time"),
+        ("landing time", "landing_time"),
         ("kisses", "kisses"),
-        ("passes", "role_changes"),
-        ("mean v", "mean_speed_leading"),
+        ("role changes", "role_changes"),
+        ("mean speed leading", "mean_speed_leading"),
     ];
     const SETTLING: [(&str, &str); 8] = [
         ("grains", "grains"),
         ("landed", "landed"),
-        ("peak v [m/s]", "peak_speed_m_per_s"),
-        ("final v [m/s]", "final_speed_m_per_s"),
-        ("final Re", "final_reynolds"),
-        ("lands at [s]", "landing_time_s"),
-        ("drift/d", "drift"),
+        ("peak speed [m/s]", "peak_speed_m_per_s"),
+        ("final speed [m/s]", "final_speed_m_per_s"),
+        ("final Reynolds", "final_reynolds"),
+        ("landing time [s]", "landing_time_s"),
+        ("drift / d", "drift"),
         ("turned [deg]", "turned"),
     ];
     let settling = rows.iter().any(|row| row.settling.is_some());

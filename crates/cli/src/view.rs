@@ -124,7 +124,9 @@ fn of_study(folder: &Path) -> Result<Viewer, Exit> {
         let number = |value: Option<f64>| value.map_or(String::new(), |v| text(rounded(v)));
         let levels = axes.iter().map(|axis| record.levels.get(*axis).cloned().unwrap_or_default());
         let measured = quantities.iter().map(|name| number(record.measured(name)));
-        let values = levels.chain([number(record.kiss_time_s)]).chain(measured).collect();
+        // A contact after the landing is no kiss.
+        let kiss = record.kiss_time_s.filter(|_| record.measured("kiss_time").is_some());
+        let values = levels.chain([number(kiss)]).chain(measured).collect();
         let (name, state) = (record.name.clone(), record.state.to_string());
         table.rows.push(StudyRow { name, state, run: index, values });
     }

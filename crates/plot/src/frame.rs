@@ -3,8 +3,11 @@
 use crate::axis::Axis;
 use crate::curve;
 use crate::drawing::{Anchor, Drawing, path_data};
-use crate::style::{FAINT, GRID, LINE, TICK};
-use crate::ticks;
+use crate::style::{FAINT, GRID, LINE, TEXT, TICK};
+use crate::{text, ticks};
+
+/// Distance of two lines of a label [pt].
+const LINE_SPACING: f64 = 9.0;
 
 /// A rectangle on paper with a horizontal and a vertical axis.
 pub struct Frame {
@@ -61,8 +64,23 @@ impl Frame {
             self.horizontal_label(drawing);
         }
         if labelled.up {
-            let middle = (x - TICK - ticks::widest(&self.up) - 7.0, y + 0.5 * height);
-            drawing.upward_text(middle, &self.up.label);
+            let right = x - TICK - ticks::widest(&self.up) - 7.0;
+            let lines = self.upward_lines();
+            for (i, line) in lines.iter().rev().enumerate() {
+                drawing.upward_text((right - LINE_SPACING * i as f64, y + 0.5 * height), line);
+            }
+        }
+    }
+
+    /// Returns the lines of the vertical label: name and unit are apart if they are longer than the
+    /// frame is high.
+    fn upward_lines(&self) -> Vec<&str> {
+        let label = self.up.label.as_str();
+        match label.split_once("  ") {
+            Some((name, unit)) if text::width(label, TEXT) > self.height + 8.0 => {
+                vec![name, unit.trim_start()]
+            }
+            _ => vec![label],
         }
     }
 

@@ -2,13 +2,18 @@
 
 use glam::DVec3;
 use grainwake_formats::events::{Event, EventKind};
+use grainwake_plot::equal_aspect::length_unit;
 use grainwake_plot::minus;
 
 use crate::phases::{self, Instant, PairEvent, Phase};
 use crate::run_folder::{History, RunFolder};
 
-/// Part of the diameter below which a distance is round-off.
-const ROUND_OFF: f64 = 1e-6;
+/// Part of the diameter below which a distance is round-off, and of the largest component below
+/// which another one is.
+pub const ROUND_OFF: f64 = 1e-6;
+/// Part of the diameter that is the least range of an axis of positions, and below which a drift is
+/// not stated.
+pub const LEAST: f64 = 1e-3;
 
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -258,6 +263,12 @@ pub fn galileo(scales: Scales, ratio: f64, viscosity: f64) -> f64 {
     ((ratio - 1.0).abs() * scales.gravity * scales.diameter.powi(3)).sqrt() / viscosity
 }
 
+/// Returns a length [m] with three significant digits and the unit that suits it.
+pub fn length(value: f64) -> String {
+    let (unit, factor) = length_unit(value.abs());
+    format!("{} {unit}", short(value * factor))
+}
+
 /// Returns a value with three significant digits, in label markup.
 pub fn short(value: f64) -> String {
     if value == 0.0 {
@@ -299,6 +310,12 @@ mod tests {
                 "not known"
             ]
         );
+    }
+
+    #[test]
+    fn lengths_have_the_unit_of_their_size() {
+        let texts = [15.0, 0.016, 0.125e-3, 2e-6].map(length);
+        assert_eq!(texts, ["15.0 m", "16.0 mm", "125 µm", "2.00 µm"]);
     }
 
     #[test]

@@ -28,6 +28,36 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     write_atomically(path, false, |out| out.write_all(bytes))
 }
 
+/// File in `figures/` that lists the figures of the last report, one name per line.
+const LIST: &str = ".figures";
+
+/// Removes the figures of an earlier report that are not among the `written` ones, and lists these
+/// for the next report. Other files in the folder stay.
+///
+/// # Errors
+/// If a figure cannot be removed or the list cannot be written.
+pub fn remove_earlier_figures(folder: &Path, written: &[WrittenFigure]) -> Result<(), ReportError> {
+    let list = folder.join(LIST);
+    let files = written.iter().flat_map(|f| [&f.png_file, &f.svg_file]);
+    let names: Vec<&str> = files.filter_map(|file| file.file_name()?.to_str()).collect();
+    // A missing or unreadable list names no file.
+    let earlier = std::fs::read_to_string(&list).unwrap_or_default();
+    let is_figure = |name: &&str| {
+        let plain = Path::new(name).file_name().is_some_and(|file| file == *name);
+        plain && (name.ends_with(".png") || name.ends_with(".svg"))
+    };
+    for name in earlier.lines().filter(is_figure).filter(|name| !names.contains(name)) {
+        let path = folder.join(name);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).written(&path);
+            }
+            _ => (),
+        }
+    }
+    write_file(&list, (names.join("\n") + "\n").as_bytes()).written(&list)
+}
+
 /// Writes a figure as `NAME.png` and `NAME.svg` into an existing folder.
 ///
 /// # Errors

@@ -24,7 +24,7 @@ pub mod thumbnail;
 use std::path::{Path, PathBuf};
 
 pub use error::ReportError;
-pub use files::{WrittenFigure, write_figure, write_file};
+pub use files::{WrittenFigure, remove_earlier_figures, write_figure, write_file};
 pub use film::{Film, write_film};
 use grainwake_formats::disk;
 use grainwake_plot::Figure;
@@ -94,6 +94,7 @@ pub fn render(run_dir: &Path) -> Result<ReportFiles, ReportError> {
     let figures: Vec<WrittenFigure> = figures
         .map(|(figure, number)| write_figure(&folder, figure.numbered(number)))
         .collect::<Result<_, _>>()?;
+    files::remove_earlier_figures(&folder, &figures)?;
     let page = run_dir.join("report.html");
     let text = page::page(&run, &features, &figures, &notes);
     write_file(&page, text.as_bytes()).written(&page)?;

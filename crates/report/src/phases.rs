@@ -10,7 +10,7 @@ pub enum PhaseKind {
     Drafting,
     /// In contact, in the initial order.
     Kissing,
-    /// Rotation about each other, in contact or just separated.
+    /// Rotation about each other, in contact.
     Tumbling,
     /// Apart after a contact.
     Separated,
@@ -45,7 +45,7 @@ pub struct Phase {
 /// Derives the phases from the events of a pair that is observed until `end` [s].
 ///
 /// `tumble` [s] is the start of the tumbling according to the summary; without it, the first role
-/// change in contact starts the tumbling.
+/// change in contact starts the tumbling. A later tumble of a separated pair starts no phase.
 pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
     use PhaseKind::{Drafting, Kissing, Landed, Separated, Tumbling};
     let events = events.iter().map(|event| (event.time, event.kind));
@@ -60,8 +60,6 @@ pub fn phases(events: &[Event], tumble: Option<f64>, end: f64) -> Vec<Phase> {
             (_, Landed) => Landed,
             (EventKind::Kiss, Drafting | Separated) => Kissing,
             (EventKind::RoleChange | EventKind::Tumble, Kissing) => Tumbling,
-            // A pair may tumble after a short contact, before the separation is certain.
-            (EventKind::Tumble, Separated) => Tumbling,
             (EventKind::Separation, Kissing | Tumbling) => Separated,
             (EventKind::Landing, _) => Landed,
             (_, same) => same,
@@ -151,11 +149,7 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
     };
     let mut reversed = phases.iter().rev();
     let separated = reversed.find(|phase| phase.kind == PhaseKind::Separated);
-    let tumbling = of(PhaseKind::Tumbling);
-    // Tumbling after the separation is the last instant.
-    let late_tumbling = tumbling.filter(|t| separated.is_some_and(|s| s.start < t.start));
-    let early_tumbling = tumbling.filter(|_| late_tumbling.is_none());
-    let third = role_change_after(kiss).unwrap_or_else(|| match early_tumbling {
+    let third = role_change_after(kiss).unwrap_or_else(|| match of(PhaseKind::Tumbling) {
         Some(phase) => instant(0.5 * (phase.start + phase.end), "tumbling"),
         None => {
             let contact_end = separated.map_or(landing, |phase| phase.start);
@@ -163,10 +157,9 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
         }
     });
     let late = |phase: &Phase| 0.5 * (phase.start.max(third.time) + phase.end);
-    let fourth = match (late_tumbling, separated) {
-        (Some(phase), _) => instant(late(phase), "tumbling"),
-        (None, Some(phase)) => instant(late(phase), "separated"),
-        (None, None) => instant(landing, if landing < end { "landing" } else { "end" }),
+    let fourth = match separated {
+        Some(phase) => instant(late(phase), "separated"),
+        None => instant(landing, if landing < end { "landing" } else { "end" }),
     };
     let (first, second) = (instant(0.6 * kiss, "drafting"), instant(kiss, "kiss"));
     vec![first, second, third, fourth]

@@ -526,6 +526,9 @@ fn eight_cells_are_enough_and_fewer_are_warned_of() {
     assert!(!warnings(&tenths).contains("cells across"), "{}", warnings(&tenths));
     let coarse = warnings(&cells("cell_size = \"0.5 mm\""));
     assert!(coarse.contains("only 4.0 cells across the smallest grain: below 8"), "{coarse}");
+    assert!(!coarse.contains("may become unstable"), "{coarse}");
+    let coarser = warnings(&cells("cells = [40, 40, 156]"));
+    assert!(coarser.contains("below 4 the run may become unstable"), "{coarser}");
 }
 
 #[test]

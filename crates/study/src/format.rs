@@ -44,11 +44,12 @@ pub fn percent(value: f64) -> String {
     format!("{:.1} %", 100.0 * value).replace('-', "−")
 }
 
-/// Start of a sentence about pairs without an event: "1 pair landed, or its run ended, before".
-pub fn missed(pairs: usize) -> String {
-    match pairs {
-        1 => "1 pair landed, or its run ended, before".to_owned(),
-        n => format!("{n} pairs landed, or their runs ended, before"),
+/// Returns the start of a sentence about models without an event: "1 model, whose pair landed or
+/// whose run ended before, has".
+pub fn missed(models: usize) -> String {
+    match models {
+        1 => "1 model, whose pair landed or whose run ended before, has".to_owned(),
+        n => format!("{n} models, whose pairs landed or whose runs ended before, have"),
     }
 }
 

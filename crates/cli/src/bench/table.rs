@@ -15,6 +15,8 @@ pub fn one(m: &Measured) -> String {
             let what = format!("{nx} x {ny} x {nz} cells of {bytes} bytes a number");
             (what, "ns per cell and step", 1e9 / grid.cells.iter().product::<usize>() as f64)
         }
+        // A step of a few grains takes microseconds.
+        None if m.seconds_per_step.median < 1e-4 => ("dry".into(), "us per step", 1e6),
         None => ("dry".into(), "ms per step", 1e3),
     };
     let row = |name: &str, times: &Times, limit: Option<f64>| {

@@ -4,7 +4,7 @@ use grainwake_plot::stacked::{Panel, Series};
 use grainwake_plot::{Figure, lettered, style};
 
 use super::scene::{AXES, Points, Scene};
-use crate::features::short;
+use crate::features::{ROUND_OFF, short};
 use crate::run_folder::History;
 
 /// Draws the mean height, speed and number of contacts of many grains.
@@ -26,11 +26,14 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     let squares = mean(&|h, row| h.velocity[row].length_squared());
     let speed: Points = squares.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
     let contacts = mean(&|h, row| h.contacts[row].map_or(f64::NAN, f64::from));
-    let height = mean(&|h, row| 1e3 * h.position[row].dot(up));
+    let (unit, factor) = scene.height_unit();
+    let height = mean(&|h, row| factor * h.position[row].dot(up));
     let (last_speed, last_contacts) = (speed.last()?.1, contacts.last()?.1);
     let curve = |points, colour| vec![Series::new(points, colour)];
     let height = curve(height, style::BLUE);
-    let mut panels = vec![Panel::linear("mean height  [mm]", height, &[], 70.0)];
+    let around = scene.least_range(height.iter().flat_map(Series::values), factor);
+    let label = format!("mean height  [{unit}]");
+    let mut panels = vec![Panel::linear(&label, height, &around, 70.0)];
     let speed = curve(speed, style::VERMILION);
     panels.extend(Panel::log("rms speed  [m/s]", speed, 80.0));
     let mut caption = format!(
@@ -66,14 +69,16 @@ pub fn each(scene: &Scene) -> Option<Figure> {
         };
         moving.iter().enumerate().map(one).collect()
     };
-    let height = curves(&|h, row| 1e3 * h.position[row].dot(up));
+    let (unit, factor) = scene.height_unit();
+    let height = curves(&|h, row| factor * h.position[row].dot(up));
     let velocity = curves(&|h, row| h.velocity[row].dot(up));
     let peak = |(grain, curve): (&usize, &Series)| {
         Some(format!("{} of grain {grain}", short(curve.peak()?.1)))
     };
     let peaks: Vec<String> = moving.iter().zip(&velocity).filter_map(peak).collect();
+    let around = scene.least_range(height.iter().flat_map(Series::values), factor);
     let panels = [
-        Panel::linear("height  [mm]", height, &[], 110.0),
+        Panel::linear(&format!("height  [{unit}]"), height, &around, 110.0),
         Panel::linear("*v*_{z}  [m/s]", velocity, &[0.0], 110.0),
     ];
     let caption = format!(
@@ -91,16 +96,22 @@ pub fn force(scene: &Scene) -> Option<Figure> {
     let driven = !scene.features.travels || scene.features.scales.is_none();
     let grain = scene.moving().first().copied().filter(|_| driven)?;
     let history = &scene.run.grains[grain];
+    let forces = history.force.iter().flatten().flat_map(|force| force.to_array());
+    let largest = forces.filter(|f| f.is_finite()).map(f64::abs).fold(0.0, f64::max);
+    // A component that is round-off of the others is zero.
+    let shown = |f: f64| if f.abs() < ROUND_OFF * largest { 0.0 } else { f };
     let component = |(axis, colour): (usize, &'static str)| Series {
         name: Some(format!("*F*_{{{}}}", AXES[axis])),
         colour,
-        ..scene.curve(grain, |h, row| h.force[row].map_or(f64::NAN, |force| force[axis]))
+        ..scene.curve(grain, |h, row| h.force[row].map_or(f64::NAN, |force| shown(force[axis])))
     };
     let colours = [style::BLUE, style::VERMILION, style::GREEN];
     let curves: Vec<Series> = colours.into_iter().enumerate().map(component).collect();
     let known = |v: f64| v.is_finite() && v != 0.0;
     let known = curves.iter().flat_map(Series::values).any(known);
-    let last = history.force.last().copied().flatten().filter(|_| known)?.to_array().map(short);
+    let last = history.force.last().copied().flatten().filter(|_| known)?.to_array();
+    let size = last.iter().fold(0.0, |size: f64, f| size.max(f.abs()));
+    let last = last.map(|f| short(if f.abs() < ROUND_OFF * size { 0.0 } else { f }));
     let caption =
         format!("Force of the fluid on grain {grain}: ({}) N at the end.", last.join(", "));
     let panels = [Panel::linear("force  [N]", curves, &[0.0], 110.0)];
@@ -110,7 +121,7 @@ pub fn force(scene: &Scene) -> Option<Figure> {
 /// Draws the divergence, the CFL number, the residual of the momentum and the kinetic energy.
 pub fn diagnostics(scene: &Scene) -> Option<Figure> {
     let points = |names: &[&str]| {
-        let points = scene.diagnostic(names)?;
+        let points = scene.diagnostic(names).filter(|points| points.len() > 1)?;
         let known = |p: &(f64, f64)| p.1.is_finite() && p.1 != 0.0;
         points.iter().any(known).then_some(points)
     };

@@ -36,7 +36,15 @@ pub fn all(
         instants: phases::snap(&features.instants, &picture_times(run)),
     };
     let mut out = Vec::new();
+    let has_curves = run.has_curves();
+    if !has_curves && features.kind != RunKind::Flow {
+        let note = "grains.csv has fewer than two rows for each grain: no curves are drawn. Run \
+                    the case with a shorter output.tables.";
+        notes.push(note.to_owned());
+    }
     match features.kind {
+        RunKind::Many if !has_curves => out.extend(positions::figure(&scene)),
+        _ if !has_curves => {}
         RunKind::Pair => {
             out.extend(trajectory::figure(&scene));
             out.extend(curves::gap(&scene));

@@ -9,7 +9,7 @@ use grainwake_plot::style::PAGE;
 
 use super::grain_surface::Outline;
 use super::scene::{AXES, Scene};
-use crate::features::short;
+use crate::features::{length, short};
 
 /// Left margin [pt].
 const LEFT: f64 = 38.0;
@@ -47,6 +47,10 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let up = scene.vertical();
     let [across, depth] = scene.horizontal();
     let (low, high) = extent(grains.iter().map(|g| place(*g)[up]))?;
+    let highest = high;
+    // Equal heights have one colour.
+    let (low, high) =
+        extent(scene.least_range([low, high].into_iter(), 1.0).into_iter().chain([low, high]))?;
     let default = 0.05 * (high - low);
     let margin = run.facts.diameter().unwrap_or(default).max(1e-9);
     let span = |axis: usize| -> Option<(f64, f64)> {
@@ -127,12 +131,12 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let time = run.grains[grains[0]].time[last(grains[0])];
     let caption = format!(
         "The {} grains at *t* = {} s, from the side (along {}) and from above, as {}; colour shows \
-         the height of the centre. The highest centre lies {} mm above the lower side of the box.{}",
+         the height of the centre. The highest centre lies {} above the lower side of the box.{}",
         grains.len(),
         short(time),
         AXES[depth],
         scene.drawn_as(&grains),
-        short(1e3 * (high - run.facts.lower[up])),
+        length(highest - run.facts.lower[up]),
         scene.left_out(&grains)
     );
     Some(Figure::new("positions", "Positions of the grains", caption, drawing))

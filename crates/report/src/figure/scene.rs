@@ -3,13 +3,14 @@
 use glam::DVec3;
 use grainwake_formats::events::Event;
 use grainwake_plot::Figure;
-use grainwake_plot::axis::{Axis, AxisRange};
+use grainwake_plot::axis::{Axis, AxisRange, extent};
+use grainwake_plot::equal_aspect::length_unit;
 use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
 use grainwake_plot::style::series_colour;
 
 use super::grain_surface::{self, Outline, Surfaces};
 use super::section::SliceView;
-use crate::features::RunFeatures;
+use crate::features::{LEAST, RunFeatures};
 use crate::phases::Instant;
 use crate::run_folder::{History, RunFolder};
 
@@ -103,6 +104,25 @@ impl Scene<'_> {
         let column = names.iter().find_map(|name| table.column(name))?;
         let rows = table.column("time")?.iter().zip(column);
         Some(rows.map(|(time, value)| (time * factor, *value)).collect())
+    }
+
+    /// Returns the unit of the heights of the grains, and the number of units per metre.
+    pub fn height_unit(&self) -> (&'static str, f64) {
+        let up = self.vertical();
+        let heights = self.run.grains.iter().flat_map(|h| &h.position).map(|p| p[up].abs());
+        let box_height = self.run.facts.size.map_or(0.0, |size| size[up]);
+        length_unit(heights.filter(|z| z.is_finite()).fold(box_height, f64::max))
+    }
+
+    /// Returns the ends of the least range of an axis of positions around the values, which have
+    /// `factor` units per metre: a resting grain has no ticks of round-off.
+    pub fn least_range(&self, values: impl Iterator<Item = f64>, factor: f64) -> Vec<f64> {
+        let half = 0.5 * LEAST * factor * self.run.facts.diameter().unwrap_or(0.0);
+        let ends = |(low, high): (f64, f64)| {
+            let middle = 0.5 * (low + high);
+            vec![middle - half, middle + half]
+        };
+        extent(values).map(ends).unwrap_or_default()
     }
 
     /// Returns the grains with a history; of a pair, the trailing one first.

@@ -178,7 +178,8 @@ fn planes(scene: &Scene, columns: &[Column]) -> String {
         return String::new();
     };
     let normal = AXES[first.view.normal];
-    let follows = if scene.features.travels { " The window follows the motion." } else { "" };
+    let moves = columns.windows(2).any(|c| c[0].window != c[1].window);
+    let follows = if moves { " The window follows the motion." } else { "" };
     let several = columns.iter().any(|column| column.sections.len() > 1);
     match (scene.features.kind, scene.features.pair) {
         (_, Some(pair)) if several => {

@@ -8,7 +8,7 @@ use grainwake_plot::style::{self, COLUMN, SMALL, series_colour};
 use grainwake_plot::{Figure, letter};
 
 use super::scene::{AXES, Scene};
-use crate::features::short;
+use crate::features::{LEAST, length};
 use crate::phases::Instant;
 
 /// Left margin [pt].
@@ -84,7 +84,10 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     }
     caption += &scene.left_out(&grains);
     if let Some(drift) = largest_drift(scene, &grains, up) {
-        caption += &format!(" Largest sideways drift: {} mm.", short(1e3 * drift));
+        caption += &match scene.run.facts.diameter() {
+            Some(d) if drift < LEAST * d => format!(" Sideways drift below {LEAST} *d*."),
+            _ => format!(" Largest sideways drift: {}.", length(drift)),
+        };
     }
     let title = match grains.len() {
         1 => "Path of the grain",

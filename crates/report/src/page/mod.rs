@@ -2,6 +2,7 @@
 
 mod tables;
 
+use grainwake_formats::events::EventKind;
 use grainwake_plot::{literal, plain};
 use maud::{Markup, html};
 use serde_json::Value;
@@ -9,7 +10,7 @@ use serde_json::Value;
 use crate::features::{RunFeatures, RunKind, short};
 use crate::files::WrittenFigure;
 use crate::html::{self, label, name_column, notice, number_column, section};
-use crate::phases::{Phase, PhaseKind};
+use crate::phases::{self, Phase, PhaseKind};
 use crate::run_folder::RunFolder;
 
 /// Saved 3-D page in a run folder, to which the report links.
@@ -53,7 +54,7 @@ fn title<'a>(run: &'a RunFolder, features: &RunFeatures) -> &'a str {
 /// Returns one or two sentences with the main result and the extent of the run.
 fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
     let result = match features.kind {
-        RunKind::Pair => pair_sentence(features),
+        RunKind::Pair => pair_sentence(run, features),
         RunKind::Single => single_sentence(run, features),
         RunKind::Many => format!("{} grains. ", run.moving().len()),
         RunKind::Flow => String::new(),
@@ -68,15 +69,20 @@ fn lead(run: &RunFolder, features: &RunFeatures) -> Markup {
     label(&format!("{result}The run covers {end} s of simulated time{wall}{reason}."))
 }
 
-fn pair_sentence(features: &RunFeatures) -> String {
+fn pair_sentence(run: &RunFolder, features: &RunFeatures) -> String {
     let Some(kiss) = features.kiss else {
-        return "The two grains did not touch. ".to_owned();
+        return match run.finished() {
+            true => "The two grains did not touch. ".to_owned(),
+            false => "The two grains have not touched so far. ".to_owned(),
+        };
     };
     let mut events = vec![(kiss.time, format!("kissed at {}", features.pair_event_text(kiss)))];
     let tumbling = |phase: &&Phase| phase.kind == PhaseKind::Tumbling;
     if let Some(phase) = features.phases.iter().find(tumbling) {
         let text = format!("tumbled from {}", features.time_text(phase.start));
         events.push((phase.start, text));
+    } else if let Some(time) = late_tumble(run, features) {
+        events.push((time, format!("tumbled at {}", features.time_text(time))));
     }
     if let Some(separation) = features.separation {
         let text = format!("separated at {}", features.pair_event_text(separation));
@@ -90,7 +96,21 @@ fn pair_sentence(features: &RunFeatures) -> String {
     format!("The two grains {}. ", texts.join(", "))
 }
 
+/// Returns the time of a tumble after the separation and before the landing [s].
+fn late_tumble(run: &RunFolder, features: &RunFeatures) -> Option<f64> {
+    let time = phases::first(&run.events, EventKind::Tumble)?;
+    let separated = |phase: &&Phase| phase.kind == PhaseKind::Separated;
+    let last = features.phases.iter().rfind(separated)?;
+    (last.start <= time && time <= last.end).then_some(time)
+}
+
 fn single_sentence(run: &RunFolder, features: &RunFeatures) -> String {
+    if !run.has_curves() {
+        // A single row, that of the end, does not show the fastest motion.
+        let peak = run.peak_settling_speed().filter(|v| features.is_motion(run, *v));
+        let text = |v| format!("The largest settling speed was {} m/s. ", short(v));
+        return peak.map_or(String::new(), text);
+    }
     let velocities = run.grains.iter().flat_map(|h| &h.velocity).filter(|v| v.is_finite());
     let fastest = velocities.max_by(|a, b| a.length().total_cmp(&b.length()));
     match fastest.filter(|v| features.is_motion(run, v.length())) {

@@ -1,11 +1,12 @@
 //! Tables of the report page: parameters, events, provenance.
 
 use grainwake_formats::events::Event;
+use grainwake_plot::equal_aspect::length_unit;
 use grainwake_plot::literal;
 use maud::{Markup, html};
 use serde_json::Value;
 
-use crate::features::{RunFeatures, galileo, short};
+use crate::features::{RunFeatures, galileo, length, short};
 use crate::html::{label, number_column, properties, table, text_column};
 use crate::run_folder::{Facts, RunFolder};
 
@@ -66,6 +67,10 @@ fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let velocities = run.grains.iter().flat_map(|h| &h.velocity);
     let speeds = velocities.filter_map(|v| facts.relative_speed(*v));
     let fastest = speeds.filter(|v| v.is_finite()).reduce(f64::max);
+    let fastest = match run.has_curves() || facts.has_inflow() {
+        true => fastest,
+        false => run.peak_settling_speed(),
+    };
     let fastest = fastest.filter(|speed| features.is_motion(run, *speed));
     let known = fastest.zip(diameter).zip(viscosity);
     let relative = if facts.has_inflow() { " relative to the inflow" } else { "" };
@@ -81,8 +86,12 @@ fn physics(run: &RunFolder, features: &RunFeatures) -> Rows {
 fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
     let facts = &run.facts;
     let mut rows = Rows::default();
-    let size = facts.size.map(|size| (1e3 * size).to_array().map(short));
-    rows.add("box", size.map(|size| format!("{} mm", size.join(" × "))));
+    let size = facts.size.map(|size| {
+        let (unit, factor) = length_unit(size.max_element());
+        let edges = (factor * size).to_array().map(short);
+        format!("{} {unit}", edges.join(" × "))
+    });
+    rows.add("box", size);
     let cells = |[x, y, z]: [usize; 3]| {
         format!("{x} × {y} × {z} = {:.3} million", (x * y * z) as f64 / 1e6)
     };
@@ -91,7 +100,7 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
         rows.add("fields", "single precision".to_owned());
     }
     let cell = facts.cell();
-    rows.add("cell edge *h*", cell.map(|h| format!("{} mm", short(1e3 * h))));
+    rows.add("cell edge *h*", cell.map(length));
     let resolution = facts.diameter().zip(cell).map(|(d, h)| d / h);
     rows.add("cells per diameter *d*/*h*", resolution.map(short));
     if let Some(ratio) = facts.refinement {
@@ -106,8 +115,10 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
         };
         rows.add(&format!("faces in *{axis}*"), text);
     }
-    rows.add("coupling", facts.scheme.as_deref().map(literal));
-    rows.add("contact", contact(run));
+    if !facts.grains.is_empty() {
+        rows.add("coupling", facts.scheme.as_deref().map(literal));
+        rows.add("contact", contact(run));
+    }
     rows.add("simulated time", format!("{} s", short(features.end)));
     let scaled = features.scales.map(|scales| short(features.end / scales.time()));
     rows.add("simulated time *t* √(*g*/*d*)", scaled);
@@ -125,18 +136,21 @@ fn numerics(run: &RunFolder, features: &RunFeatures) -> Rows {
 fn contact(run: &RunFolder) -> Option<String> {
     let Facts { contact, contact_law, .. } = &run.facts;
     let mut parts = vec![contact_law.clone().unwrap_or_else(|| "linear".into())];
-    for (key, name, unit, scale) in [
-        ("stiffness", "stiffness", " N/m", 1.0),
-        ("friction", "friction", "", 1.0),
-        ("wall_friction", "wall friction", "", 1.0),
-        ("restitution", "restitution", "", 1.0),
-        ("lubrication_gap", "lubrication below", " mm", 1e3),
-        ("roughness", "roughness", " mm", 1e3),
-        ("global_damping", "global damping", " 1/s", 1.0),
+    for (key, name, unit) in [
+        ("stiffness", "stiffness", " N/m"),
+        ("friction", "friction", ""),
+        ("wall_friction", "wall friction", ""),
+        ("restitution", "restitution", ""),
+        ("lubrication_gap", "lubrication below", "m"),
+        ("roughness", "roughness", "m"),
+        ("global_damping", "global damping", " 1/s"),
     ] {
-        let is_off = |value: f64| value == 0.0 && matches!(unit, " mm" | " 1/s");
+        let is_off = |value: f64| value == 0.0 && matches!(unit, "m" | " 1/s");
         if let Some(value) = contact.get(key).copied().filter(|value| !is_off(*value)) {
-            parts.push(format!("{name} {}{unit}", short(scale * value)));
+            parts.push(match unit {
+                "m" => format!("{name} {}", length(value)),
+                _ => format!("{name} {}{unit}", short(value)),
+            });
         }
     }
     (!contact.is_empty()).then(|| parts.join(", "))
@@ -161,7 +175,7 @@ fn add_grains(rows: &mut Rows, run: &RunFolder) {
     for (index, grain) in run.facts.grains.iter().enumerate() {
         let mut text = literal(grain.shape.as_deref().unwrap_or("shape not known"));
         if let Some(diameter) = grain.diameter {
-            text += &format!(", *d* = {} mm", short(1e3 * diameter));
+            text += &format!(", *d* = {}", length(diameter));
         }
         if let Some(density) = grain.density {
             text += &format!(", *ρ*_{{p}} = {} kg/m^{{3}}", short(density));
@@ -227,7 +241,7 @@ fn precise(value: f64) -> String {
 /// Returns the details of an event, in label markup.
 fn details(event: &Event) -> Vec<String> {
     let confirmed = format!("certain at {} s", precise(event.confirmed));
-    let gap = event.gap.map(|gap| format!("gap {} mm", short(1e3 * gap)));
+    let gap = event.gap.map(|gap| format!("gap {}", length(gap)));
     let tilt = event.tilt.map(|tilt| short(tilt.to_degrees()));
     let tilt = tilt.map(|degrees| format!("pair {degrees}° from the vertical"));
     let wall = event.wall.as_ref().map(|wall| format!("{wall} wall"));

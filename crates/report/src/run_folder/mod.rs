@@ -81,6 +81,18 @@ impl RunFolder {
         RunFolder::open_with(path, Damage::Refuse)
     }
 
+    /// Returns whether the tables have the rows of a curve: two or more.
+    pub fn has_curves(&self) -> bool {
+        self.grains.iter().any(|history| history.len() > 1)
+    }
+
+    /// Returns the largest settling speed of all grains over all steps [m/s], from `summary.json`.
+    pub fn peak_settling_speed(&self) -> Option<f64> {
+        let grains = self.summary.as_ref()?.get("grains")?.as_array()?.iter();
+        let speed = |grain: &Value| grain.get("peak_settling_speed_m_per_s")?.as_f64();
+        grains.filter_map(speed).reduce(f64::max)
+    }
+
     /// Returns whether a folder holds a file of a run.
     pub fn exists_in(path: &Path) -> bool {
         let known = ["case.resolved.toml", "grains.csv", "diagnostics.csv", "summary.json"];

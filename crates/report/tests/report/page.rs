@@ -512,7 +512,7 @@ fn headline_and_figures_agree_on_kiss_and_separation() {
 }
 
 #[test]
-fn tumbling_after_the_separation_stays_in_the_table() {
+fn a_tumble_after_the_separation_is_an_event_and_no_phase() {
     let (page, _) =
         report(&[(13.2, "kiss"), (13.6, "separation"), (13.8, "tumble"), (44.0, "landing")]);
     let spoken = page.split("aria-label=\"Phases: ").nth(1).unwrap();
@@ -523,9 +523,9 @@ fn tumbling_after_the_separation_stays_in_the_table() {
         .split("; ")
         .filter_map(|phase| phase.split(' ').next())
         .collect();
-    assert_eq!(phases, ["drafting", "kissing", "separated", "tumbling", "landed"]);
+    assert_eq!(phases, ["drafting", "kissing", "separated", "landed"]);
     let lead = page.split("<p class=\"lead\">").nth(1).unwrap();
-    let [parted, tumbled] = ["separated at", "tumbled from"].map(|text| lead.find(text).unwrap());
+    let [parted, tumbled] = ["separated at", "tumbled at"].map(|text| lead.find(text).unwrap());
     assert!(parted < tumbled);
 }
 
@@ -727,5 +727,96 @@ fn letters_follow_a_grain_through_a_periodic_box() {
         }
     });
     in_order();
+    remove(&folder);
+}
+
+#[test]
+fn a_table_of_one_row_gives_no_curves_and_the_peak_of_the_summary() {
+    let folder = fresh::folder("one-row");
+    flows::single(&folder);
+    let table = std::fs::read_to_string(folder.join("grains.csv")).unwrap();
+    let lines: Vec<&str> = table.lines().collect();
+    // The last row is that of the rebound.
+    let mut last: Vec<String> = lines[lines.len() - 1].split(',').map(str::to_owned).collect();
+    last[7] = "0.183".into();
+    std::fs::write(folder.join("grains.csv"), format!("{}\n{}\n", lines[0], last.join(",")))
+        .unwrap();
+    let summary = folder.join("summary.json");
+    let mut value: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&summary).unwrap()).unwrap();
+    value["grains"] = serde_json::json!([{ "peak_settling_speed_m_per_s": 0.1216 }]);
+    std::fs::write(&summary, value.to_string()).unwrap();
+    let rendered = render(&folder).unwrap();
+    let curves = ["trajectories", "velocity", "force", "orientation"];
+    assert!(!names(&rendered).iter().any(|name| curves.contains(&name.as_str())));
+    let said = page(&rendered);
+    assert!(said.contains("largest settling speed was 0.122 m/s"), "{said}");
+    assert!(!said.contains("upwards") && said.contains("fewer than two rows"));
+    remove(&folder);
+}
+
+#[test]
+fn round_off_of_resting_grains_is_not_drawn() {
+    let folder = fresh::folder("rest");
+    heap::heap(&folder, 5, false);
+    edit_rows(&folder, |cells| {
+        cells[4] = format!("0.0099997150{}", cells[1]);
+        cells[5..8].fill("0".into());
+    });
+    let rendered = render(&folder).unwrap();
+    let seen = text_of(&svg(&rendered, "positions"));
+    assert!(!seen.contains("9.9997"), "{seen}");
+    remove(&folder);
+
+    let folder = fresh::folder("held");
+    flows::single(&folder);
+    edit_rows(&folder, |cells| {
+        cells[2..5].fill("0.01".into());
+        cells[15] = "0.444".into();
+        cells[16] = "6.67e-18".into();
+        cells[17] = "-8.13e-15".into();
+    });
+    let said = page(&render(&folder).unwrap());
+    assert!(said.contains("(0.444, 0, 0) N at the end"), "{said}");
+    remove(&folder);
+}
+
+#[test]
+fn a_later_report_removes_the_figures_of_an_earlier_one_only() {
+    let folder = fresh::folder("earlier");
+    flows::single(&folder);
+    let first = names(&render(&folder).unwrap());
+    assert!(first.contains(&"velocity".to_owned()));
+    let figures = folder.join("figures");
+    std::fs::write(figures.join("mine.png"), "mine").unwrap();
+    // A list cannot name a file elsewhere, or one that is no figure.
+    let list = std::fs::read_to_string(figures.join(".figures")).unwrap();
+    std::fs::write(figures.join(".figures"), list + "../case.resolved.toml\n../x.png\nnote.txt\n")
+        .unwrap();
+    std::fs::write(folder.join("x.png"), "").unwrap();
+    std::fs::write(figures.join("note.txt"), "").unwrap();
+    let table = std::fs::read_to_string(folder.join("grains.csv")).unwrap();
+    let head: Vec<&str> = table.lines().take(2).collect();
+    std::fs::write(folder.join("grains.csv"), head.join("\n") + "\n").unwrap();
+    let second = names(&render(&folder).unwrap());
+    assert!(!second.contains(&"velocity".to_owned()), "{second:?}");
+    let kept = [folder.join("x.png"), folder.join("case.resolved.toml")];
+    let own = ["mine.png", "note.txt", "speed.png", "speed.svg"].map(|name| figures.join(name));
+    for file in kept.iter().chain(&own) {
+        assert!(file.is_file(), "{}", file.display());
+    }
+    for name in ["velocity.png", "velocity.svg"] {
+        assert!(!figures.join(name).exists(), "{name}");
+    }
+    remove(&folder);
+}
+
+#[test]
+fn an_unfinished_pair_has_not_touched_so_far() {
+    let folder = small_pair(0.9);
+    write_log(&folder, &[]);
+    assert!(page(&render(&folder).unwrap()).contains("The two grains did not touch."));
+    std::fs::remove_file(folder.join("summary.json")).unwrap();
+    assert!(page(&render(&folder).unwrap()).contains("have not touched so far"));
     remove(&folder);
 }

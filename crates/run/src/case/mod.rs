@@ -54,7 +54,7 @@ pub use exactly::exactly;
 pub use expect::{Expectation, Verdict};
 pub use located::Located;
 pub use schema::schema;
-pub use shapes::ShapeFile;
+pub use shapes::{ClosedForms, ShapeFile};
 pub use source::Source;
 pub use suggest::{did_you_mean, nearest};
 
@@ -95,10 +95,22 @@ impl Case {
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Case, CaseError> {
+        Case::load_sharing(path, overrides, &ClosedForms::default())
+    }
+
+    /// Reads a case file as [`Case::load`], and takes its closed forms from `shapes`.
+    ///
+    /// # Errors
+    /// [`CaseError`] with every problem found and its place.
+    pub fn load_sharing(
+        path: &Path,
+        overrides: &[String],
+        shapes: &ClosedForms,
+    ) -> Result<Case, CaseError> {
         let text = read_text(path, SETTINGS)
             .map_err(|source| CaseError::Unreadable { path: path.into(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        Case::parse(&text, &path.display().to_string(), folder, overrides)
+        Case::parse_sharing(&text, &path.display().to_string(), folder, overrides, shapes)
     }
 
     /// Reads a case from text. Messages contain `name`; grain files are relative to `folder`.
@@ -111,8 +123,18 @@ impl Case {
         folder: &Path,
         overrides: &[String],
     ) -> Result<Case, CaseError> {
+        Case::parse_sharing(text, name, folder, overrides, &ClosedForms::default())
+    }
+
+    fn parse_sharing(
+        text: &str,
+        name: &str,
+        folder: &Path,
+        overrides: &[String],
+        shapes: &ClosedForms,
+    ) -> Result<Case, CaseError> {
         let (source, raw) = source::Source::parse(name, text, overrides)?;
-        let validated = validate::validate(&source, raw, Library::new(folder))?;
+        let validated = validate::validate(&source, raw, Library::new(folder, shapes))?;
         Case::of(source, validated)
     }
 
@@ -122,7 +144,8 @@ impl Case {
     /// [`CaseError`] if they are not those of a case.
     pub fn from_resolved(resolved: &str, shapes: Vec<ShapeFile>) -> Result<Case, CaseError> {
         let (source, raw) = source::Source::parse(RESOLVED, resolved, &[])?;
-        let library = Library::of_files(&shapes)
+        let closed_forms = ClosedForms::default();
+        let library = Library::of_files(&shapes, &closed_forms)
             .map_err(|(message, help)| CaseError::from(Problem::new(message).help(help)))?;
         let mut validated = validate::validate(&source, raw, library)?;
         // The digest depends on their order.

@@ -1,8 +1,8 @@
 //! Shapes of a case: `.grain` files and closed forms. Grains of equal shape share it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use grainwake_formats::bounded_file::read_bytes;
 use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, analytic};
@@ -20,22 +20,63 @@ pub type ShapeFile = (String, Arc<Vec<u8>>);
 /// Message and help of a shape that cannot be built.
 pub(super) type Refusal = (String, String);
 
+/// Largest number of closed forms that are kept.
+const KEPT: usize = 64;
+
+/// Closed forms that several cases share, so that each is built once; the oldest are dropped beyond
+/// 64.
+#[derive(Debug, Default)]
+pub struct ClosedForms {
+    /// Shapes with their definitions, the oldest first.
+    known: Mutex<VecDeque<(String, Arc<Shape>)>>,
+}
+
+impl ClosedForms {
+    /// Returns the shape with this definition; it is built if it is not known.
+    fn get(
+        &self,
+        definition: String,
+        build: impl FnOnce() -> Result<Shape, Refusal>,
+    ) -> Result<Arc<Shape>, Refusal> {
+        // The list stays valid if another thread panics.
+        let lock = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let find = |known: &VecDeque<(String, Arc<Shape>)>| {
+            known.iter().find(|(key, _)| *key == definition).map(|(_, shape)| shape.clone())
+        };
+        if let Some(shape) = find(&lock()) {
+            return Ok(shape);
+        }
+        // Without the lock, because threads may work for each other while one builds a shape.
+        let shape = Arc::new(build()?);
+        let mut known = lock();
+        if let Some(shape) = find(&known) {
+            return Ok(shape);
+        }
+        if known.len() >= KEPT {
+            known.pop_front();
+        }
+        known.push_back((definition, shape.clone()));
+        Ok(shape)
+    }
+}
+
 /// Cache of the shapes of a case.
 pub(super) struct Library<'a> {
     folder: &'a Path,
+    shared: &'a ClosedForms,
     files: BTreeMap<PathBuf, (ShapeFile, Arc<Shape>)>,
     built: BTreeMap<String, Arc<Shape>>,
 }
 
 impl<'a> Library<'a> {
-    /// Returns an empty cache; files are relative to `folder`.
-    pub fn new(folder: &'a Path) -> Library<'a> {
-        Library { folder, files: BTreeMap::new(), built: BTreeMap::new() }
+    /// Returns an empty cache; files are relative to `folder`, closed forms are `shared`.
+    pub fn new(folder: &'a Path, shared: &'a ClosedForms) -> Library<'a> {
+        Library { folder, shared, files: BTreeMap::new(), built: BTreeMap::new() }
     }
 
     /// Returns a library of these files alone, by name.
-    pub fn of_files(files: &[ShapeFile]) -> Result<Library<'a>, Refusal> {
-        let mut library = Library::new(Path::new(""));
+    pub fn of_files(files: &[ShapeFile], shared: &'a ClosedForms) -> Result<Library<'a>, Refusal> {
+        let mut library = Library::new(Path::new(""), shared);
         for file in files {
             let shape = library.shape(&file.1, Path::new(&file.0))?;
             library.files.insert(PathBuf::from(&file.0), (file.clone(), shape));
@@ -100,7 +141,7 @@ impl<'a> Library<'a> {
         // Positions in the case file are no part of the shape.
         let text = toml::to_string(raw);
         let text = text.map_err(|error| (error.to_string(), "change the shape".to_owned()))?;
-        self.built(format!("{text} {nodes}"), || build(raw, nodes))
+        self.shared.get(format!("{text} {nodes}"), || build(raw, nodes))
     }
 
     /// Returns `shape` rescaled to an equivalent diameter [m].
@@ -181,4 +222,27 @@ fn build(raw: &RawShape, nodes: usize) -> Result<Shape, Refusal> {
         };
         (error.to_string(), help.to_string())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closed_form_is_built_once() {
+        let forms = ClosedForms::default();
+        let sphere = |radius: f64| {
+            let options = ShapeOptions { nodes: Some(100), ..ShapeOptions::default() };
+            analytic::sphere(radius, &options).map_err(|e| (e.to_string(), String::new()))
+        };
+        let first = forms.get("a".into(), || sphere(1e-3)).unwrap();
+        let again = forms.get("a".into(), || panic!("built before")).unwrap();
+        assert!(Arc::ptr_eq(&first, &again));
+        assert!(forms.get("b".into(), || Err(("no".into(), String::new()))).is_err());
+        for i in 0..KEPT {
+            forms.get(i.to_string(), || sphere(2e-3)).unwrap();
+        }
+        let later = forms.get("a".into(), || sphere(1e-3)).unwrap();
+        assert!(!Arc::ptr_eq(&first, &later), "the oldest is dropped");
+    }
 }

@@ -44,6 +44,8 @@ pub(super) struct Outcome {
     pub n: usize,
     /// Number of right-censored observations.
     pub censored: usize,
+    /// Number of pairs without the event on both sides, which say nothing about a difference.
+    pub uninformative: usize,
     /// Kind of the effect.
     pub effect: Effect,
     /// Statement of the claim.
@@ -62,11 +64,22 @@ impl Outcome {
         estimate: Option<Estimate>,
         says: impl FnOnce(&Estimate) -> String,
     ) -> Outcome {
-        let says = estimate.as_ref().map_or_else(
-            || format!("{n} models or pairs of models have finished: too few for a test"),
-            says,
-        );
-        Outcome { n, censored, effect, claimed, estimate, says }
+        let untested = || match n {
+            _ if n > 0 && censored == n => {
+                format!("none of the {n} models or pairs of models has the event: no test")
+            }
+            _ => format!("{n} models or pairs of models with a value: too few for a test"),
+        };
+        let says = estimate.as_ref().map_or_else(untested, says);
+        Outcome { n, censored, uninformative: 0, effect, claimed, estimate, says }
+    }
+
+    /// Number of models or pairs of models that can show a difference.
+    pub fn informative(&self) -> usize {
+        match self.claimed {
+            Claimed::AtMost(_) => self.n,
+            _ => self.n - self.uninformative,
+        }
     }
 }
 
@@ -103,6 +116,10 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
     };
     if claim.observed {
         outcome.says += "; pairs that landed before the event are left out";
+    }
+    if outcome.uninformative > 0 && matches!(outcome.claimed, Claimed::AtMost(_)) {
+        let left_out = outcome.uninformative;
+        outcome.says += &format!("; {left_out} without the event on both sides are left out");
     }
     if outcome.censored > 0 {
         let censored = outcome.censored;
@@ -148,6 +165,7 @@ fn order(
     by_rates: bool,
 ) -> Outcome {
     let pairs = matched(all, axis, more, less);
+    let uninformative = pairs.iter().filter(|(a, b)| a.censored && b.censored).count();
     let differences: Vec<f64> = pairs.iter().map(|(a, b)| last(a) - last(b)).collect();
     let larger = differences.iter().filter(|d| **d > 0.0).count();
     let says = |e: &Estimate| {
@@ -166,11 +184,18 @@ fn order(
             pairs.iter().map(|(a, b)| [a.durations.clone(), b.durations.clone()]).collect();
         estimate = estimate.zip(log_rank(&strata)).map(|(e, p)| Estimate { p, ..e });
     }
-    Outcome::new(counts(&pairs), Effect::Difference, Claimed::Positive, estimate, says)
+    let outcome =
+        Outcome::new(counts(&pairs), Effect::Difference, Claimed::Positive, estimate, says);
+    Outcome { uninformative, ..outcome }
 }
 
+/// Tests equality by the relative differences of the pairs. Pairs without the event at both levels
+/// are left out: they would count as equal without any evidence.
 fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: &str) -> Outcome {
-    let pairs = matched(all, axis, a, b);
+    let mut pairs = matched(all, axis, a, b);
+    let every = pairs.len();
+    pairs.retain(|(a, b)| !(a.censored && b.censored));
+    let uninformative = every - pairs.len();
     let relative = |(a, b): &(&Observation, &Observation)| {
         relative_difference(last(a), last(b), 0.5 * (last(a) + last(b)))
     };
@@ -184,7 +209,8 @@ fn equal(all: &[Observation], axis: &str, [a, b]: [&str; 2], within: f64, name: 
         )
     };
     let (effect, claimed) = (Effect::RelativeDifference, Claimed::AtMost(within));
-    Outcome::new(counts(&pairs), effect, claimed, signed_rank(&relative), says)
+    let outcome = Outcome::new(counts(&pairs), effect, claimed, signed_rank(&relative), says);
+    Outcome { uninformative, ..outcome }
 }
 
 fn spread(all: &[Observation], axis: &str, [more, less]: [&str; 2], name: &str) -> Outcome {
@@ -233,10 +259,12 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
         return Outcome::new((0, 0), effect, claimed, None, |_| String::new());
     };
     let model = &reference.model;
-    let others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
+    let mut others: Vec<&Observation> = all.iter().filter(|o| o.model != *model).collect();
+    let every = others.len();
+    others.retain(|o| !(o.censored && reference.censored));
+    let uninformative = every - others.len();
     let relative = |o: &&Observation| match (o.censored, reference.censored) {
-        (true, true) => 0.0,
-        (true, false) => LAST,
+        (true, _) => LAST,
         (false, true) => -LAST,
         (false, false) => relative_difference(o.value, reference.value, reference.value),
     };
@@ -256,7 +284,8 @@ fn near(all: &[Observation], reference: Option<Observation>, within: f64, name: 
     };
     let censored = others.iter().filter(|o| o.censored || reference.censored).count();
     let estimate = signed_rank(&relative).map(unbounded);
-    Outcome::new((others.len(), censored), effect, claimed, estimate, says)
+    let outcome = Outcome::new((others.len(), censored), effect, claimed, estimate, says);
+    Outcome { uninformative, ..outcome }
 }
 
 /// Difference of two values over `scale`; zero for equal values, also if both are zero.

@@ -1,10 +1,10 @@
 //! Rank correlations of quantities with factors.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::observation::{observations, with_factor};
+use super::observation::{observations, unique, with_factor};
 use super::statistics::spearman;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Condition, Correlations};
@@ -32,10 +32,10 @@ pub struct Correlation {
 }
 
 impl Correlations {
-    /// Returns the levels of the axis, sorted.
+    /// Returns the levels of the axis, in the order of the study file.
     pub fn levels(&self, records: &[RunRecord]) -> Vec<String> {
         let levels = records.iter().filter_map(|r| r.levels.get(&self.by));
-        levels.cloned().collect::<BTreeSet<String>>().into_iter().collect()
+        unique(levels)
     }
 }
 

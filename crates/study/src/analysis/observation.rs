@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use grainwake_plot::axis::extent;
+
 use super::statistics::median;
 use super::survival::{Duration, median_time};
 use crate::measure::mean;
@@ -23,7 +25,7 @@ pub struct Observation {
     pub value: f64,
     /// Times of the members; empty of a quantity that is no time.
     pub durations: Vec<Duration>,
-    /// Smallest and largest value over the ensemble.
+    /// Smallest and largest value over the members with the event; over all members if none has it.
     pub range: (f64, f64),
     /// Whether the observation is right-censored: in at least half of the members the event has not
     /// occurred when the pair lands or the run ends.
@@ -31,6 +33,16 @@ pub struct Observation {
 }
 
 impl Observation {
+    /// Returns the number of members without the event.
+    pub fn missed(&self) -> usize {
+        self.durations.iter().filter(|duration| duration.censored).count()
+    }
+
+    /// Returns whether a member has the event, or the quantity is no time.
+    pub fn occurred(&self) -> bool {
+        self.durations.is_empty() || self.missed() < self.durations.len()
+    }
+
     /// Returns the value for rank tests; censored observations rank last, all equal.
     pub fn rank_value(&self) -> f64 {
         if self.censored { f64::INFINITY } else { self.value }
@@ -134,16 +146,15 @@ pub fn observations(
             (true, Some(time)) => (time, false),
             (true, None) => (median(&values)?, true),
         };
+        let events = || members.iter().filter(|(_, _, censored)| !censored).map(|(_, v, _)| *v);
+        let range = extent(events()).or_else(|| extent(values.iter().copied()))?;
         Some(Observation {
             model: first.model.clone(),
             levels: first.levels.clone(),
             factors: first.factors.clone(),
             value,
             durations,
-            range: (
-                values.iter().copied().fold(f64::INFINITY, f64::min),
-                values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            ),
+            range,
             censored,
         })
     };

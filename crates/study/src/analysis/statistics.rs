@@ -131,6 +131,9 @@ fn for_all_orders(values: &mut [f64], first: usize, visit: &mut impl FnMut(&[f64
     }
 }
 
+/// Fewest paired differences of which an interval reaches 95 %.
+pub const FEWEST: usize = 6;
+
 /// Performs Wilcoxon's signed-rank test of paired differences.
 ///
 /// The value is the Hodges-Lehmann estimate, the median of all Walsh averages (pairwise means).
@@ -139,7 +142,7 @@ fn for_all_orders(values: &mut [f64], first: usize, visit: &mut impl FnMut(&[f64
 /// fewer reaches 95 %; none if a difference is not finite.
 pub fn signed_rank(differences: &[f64]) -> Option<Estimate> {
     let n = differences.len();
-    if n < 6 || !differences.iter().all(|d| d.is_finite()) {
+    if n < FEWEST || !differences.iter().all(|d| d.is_finite()) {
         return None;
     }
     let mut sorted = differences.to_vec();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::claim_test::{Claimed, Effect, Outcome, test};
-use super::statistics::{Estimate, false_discovery_adjusted};
+use super::statistics::{Estimate, FEWEST, false_discovery_adjusted};
 use crate::format::p_value;
 use crate::measure::record::RunRecord;
 use crate::plan::claims::{Analysis, Claim, Condition, RANK_CORRELATION, Test, VerdictRule};
@@ -139,6 +139,7 @@ impl VerdictRule {
 ///   an interval of negligible effects.
 /// - Equality is shown by an interval of negligible effects, and contradicted by an interval
 ///   outside of them. Without a negligible size "no effect" is only contradicted: by a direction.
+/// - No effect is called negligible by fewer than [`FEWEST`] pairs with the event on either side.
 fn judge(
     rule: &VerdictRule,
     outcome: &Outcome,
@@ -149,7 +150,8 @@ fn judge(
     let significant =
         rule.false_discovery_rate.is_none_or(|rate| adjusted_p.is_some_and(|p| p < rate));
     let (rises, falls) = (significant && e.low > 0.0, significant && e.high < 0.0);
-    let inside = negligible.is_some_and(|size| e.low >= -size && e.high <= size);
+    let inside = negligible.is_some_and(|size| e.low >= -size && e.high <= size)
+        && outcome.informative() >= FEWEST;
     let outside = negligible.is_some_and(|size| e.low > size || e.high < -size);
     let (holds, contradicted) = match outcome.claimed {
         Claimed::Positive => (rises, falls || inside),

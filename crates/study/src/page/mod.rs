@@ -3,6 +3,7 @@
 mod document;
 pub mod figure;
 mod kissing;
+mod label;
 mod pairs;
 mod settling;
 mod tables;
@@ -10,7 +11,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk;
-use grainwake_report::{WrittenFigure, write_figure};
+use grainwake_report::{WrittenFigure, remove_earlier_figures, write_figure};
 use grainwake_run::case::Problem;
 use rayon::prelude::*;
 
@@ -118,6 +119,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
     write_json(&folder.join("analysis.json"), &analysis)?;
     let data = FigureData {
         plan: &shown_plan,
+        whole: &plan,
         records: &shown_records,
         folder,
         findings: &findings,
@@ -133,6 +135,7 @@ pub fn render(folder: &Path) -> Result<StudyReportFiles, StudyError> {
         .into_par_iter()
         .map(|figure| write_figure(&figure_folder, figure))
         .collect::<Result<_, _>>()?;
+    remove_earlier_figures(&figure_folder, &figures)?;
     let content = Content {
         plan: &plan,
         records: &records,

@@ -23,10 +23,11 @@ pub(super) fn lead(records: &[RunRecord]) -> Markup {
     let near_miss =
         count(|p| p.kiss_time.is_none() && p.closest_gap.is_some_and(|gap| gap < NEAR_MISS));
     html! {
-        "; " (count(|p| p.kiss_time.is_some())) " pairs kissed before landing, "
-        (count(|p| p.parted == Some(true))) " of them separated, "
-        (count(|p| p.repeated == Some(true))) " kissed more than once; " (near_miss)
-        " passed within " (NEAR_MISS) " d of each other without contact"
+        "; runs in which the pair kissed before landing: " (count(|p| p.kiss_time.is_some()))
+        ", and separated: " (count(|p| p.parted == Some(true)))
+        ", and kissed more than once: " (count(|p| p.repeated == Some(true)))
+        "; runs in which the grains passed within " (NEAR_MISS)
+        " d of each other without contact: " (near_miss)
     }
 }
 
@@ -53,11 +54,11 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
     html! {
         p {
             @if sorted.is_empty() {
-                "No finished run has a " (what) " before the grains landed."
+                "No model has a " (what) " before the grains landed, in more than half of its runs."
             } @else {
-                b { "Shortest " (what) } ": " (first.join(", ")) ". "
+                b { "Shortest " (what) ", by model" } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."
-                @if censored > 0 { " " (missed(censored)) " (right-censored)." }
+                @if censored > 0 { " " (missed(censored)) " no such time." }
             }
         }
     }

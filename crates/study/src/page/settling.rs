@@ -13,16 +13,16 @@ use crate::measure::table::SETTLING_TABLE;
 pub(super) const COLUMNS: [(&str, &str); 12] = [
     ("grains", "grains"),
     ("landed", "landed"),
-    ("peak v [m/s]", "peak_speed_m_per_s"),
-    ("final v [m/s]", "final_speed_m_per_s"),
-    ("final v / √(d g)", "final_speed"),
-    ("change of v", "speed_change"),
-    ("peak Re", "peak_reynolds"),
-    ("final Re", "final_reynolds"),
-    ("lands at [s]", "landing_time_s"),
+    ("peak speed [m/s]", "peak_speed_m_per_s"),
+    ("final speed [m/s]", "final_speed_m_per_s"),
+    ("final speed / √(d g)", "final_speed"),
+    ("speed change", "speed_change"),
+    ("peak Reynolds", "peak_reynolds"),
+    ("final Reynolds", "final_reynolds"),
+    ("landing time [s]", "landing_time_s"),
     ("drift / d", "drift"),
     ("long axis [°]", "long_axis"),
-    ("rotation [°]", "turned"),
+    ("turned [°]", "turned"),
 ];
 
 /// Largest relative change of the speed in the final window of a terminal speed.
@@ -130,7 +130,7 @@ pub(super) fn table_note() -> Markup {
     html! {
         p {
             "Final speeds are means over the last diameter fallen; for a grain that landed, over \
-             the last but one. With several grains they are averaged, and " i { "lands at" }
+             the last but one. With several grains they are averaged, and " i { "landing time" }
             " is the first landing. Values of each grain: " code { (SETTLING_TABLE) } "."
         }
     }

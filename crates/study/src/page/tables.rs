@@ -13,15 +13,15 @@ use crate::run::state::StateKind;
 
 /// Columns of the table of pairs: heading and quantity.
 const PAIR_COLUMNS: [(&str, &str); 9] = [
-    ("kiss", "kiss_time"),
-    ("kissing", "kissing_stage"),
-    ("contact", "contact_stage"),
-    ("45°", "tumble_time"),
-    ("passed", "pass_time"),
+    ("kiss time", "kiss_time"),
+    ("kissing stage", "kissing_stage"),
+    ("contact stage", "contact_stage"),
+    ("tumble time", "tumble_time"),
+    ("pass time", "pass_time"),
     ("kisses", "kisses"),
     ("role changes", "role_changes"),
-    ("v leading", "mean_speed_leading"),
-    ("v trailing", "mean_speed_trailing"),
+    ("mean speed leading", "mean_speed_leading"),
+    ("mean speed trailing", "mean_speed_trailing"),
 ];
 
 /// Returns a text, or a dash for a missing one.
@@ -65,7 +65,11 @@ pub(super) fn runs(content: &Content) -> Markup {
     let quantities = pairs.chain(settling::COLUMNS.into_iter().filter(known));
     let (headings, quantities): (Vec<&str>, Vec<&str>) = quantities.unzip();
     let mut columns = vec![name_column("run"), text_column("state")];
-    columns.extend(headings.into_iter().chain(["wall [min]"]).map(number_column));
+    // Seconds where minutes have no digit.
+    let longest = content.records.iter().filter_map(|r| r.wall_s).fold(0.0, f64::max);
+    let (wall, unit) =
+        if longest < 60.0 { ("wall time [s]", 1.0) } else { ("wall time [min]", 60.0) };
+    columns.extend(headings.into_iter().chain([wall]).map(number_column));
     let row = |record: &RunRecord| {
         let quantity = |name: &&str| {
             let value = record.measured(name).map(|v| quantity_value(name, v));
@@ -73,7 +77,7 @@ pub(super) fn runs(content: &Content) -> Markup {
         };
         let mut row = vec![html! { (record.name) }, html! { (record.state) }];
         row.extend(quantities.iter().map(quantity));
-        row.push(cell(record.wall_s.map(|s| format!("{:.1}", s / 60.0))));
+        row.push(cell(record.wall_s.map(|s| significant(s / unit))));
         row
     };
     // The page names missing runs at its head.
@@ -82,8 +86,8 @@ pub(super) fn runs(content: &Content) -> Markup {
     html! {
         @if content.has_pairs() {
             p {
-                "Dimensionless values. v: mean speed until the first landing. ≥: lower bound, the \
-                 pair landed in contact. All quantities are in " code { "table.csv" } "."
+                "Dimensionless values, until the first landing. ≥: lower bound, the pair landed in \
+                 contact. All quantities are in " code { "table.csv" } "."
             }
         }
         @if content.has_settling() { (settling::table_note()) }
@@ -110,11 +114,19 @@ pub(super) fn correlations(correlations: &[Correlation]) -> Markup {
     table(&columns, correlations.iter().map(row))
 }
 
+/// Returns a wall-clock time in hours, or in seconds below a minute.
+fn duration(seconds: f64) -> String {
+    match seconds < 60.0 {
+        true => format!("{} s", significant(seconds)),
+        false => format!("{:.2} h", seconds / 3600.0),
+    }
+}
+
 /// Returns the study file, the program and the totals of all runs.
 pub(super) fn provenance(content: &Content) -> Markup {
     let plan = content.plan;
-    let sum = |pick: fn(&RunRecord) -> Option<f64>| -> f64 {
-        content.records.iter().filter_map(pick).sum()
+    let sum = |pick: fn(&RunRecord) -> Option<f64>| -> Option<f64> {
+        content.records.iter().filter_map(pick).reduce(|a, b| a + b)
     };
     // Finished runs of the n-th accepted program.
     let accepted = |n: usize| {
@@ -122,7 +134,7 @@ pub(super) fn provenance(content: &Content) -> Markup {
         both.filter(|(run, record)| run.accepted_ids.get(n) == Some(&record.id)).count()
     };
     let divergences = content.records.iter().filter_map(|r| r.max_divergence);
-    let divergence = divergences.fold(0.0, f64::max);
+    let divergence = divergences.reduce(f64::max);
     let rows = [
         ("study file", html! { code { (plan.study.display()) } }),
         (
@@ -135,9 +147,9 @@ pub(super) fn provenance(content: &Content) -> Markup {
                 }
             },
         ),
-        ("time steps, all runs", html! { (sum(|r| r.steps.map(|n| n as f64))) }),
-        ("wall-clock time, all runs", html! { (format!("{:.2} h", sum(|r| r.wall_s) / 3600.0)) }),
-        ("largest |div u|, all runs", html! { (format!("{divergence:.1e} 1/s")) }),
+        ("time steps, all runs", cell(sum(|r| r.steps.map(|n| n as f64)).map(|n| n.to_string()))),
+        ("wall-clock time, all runs", cell(sum(|r| r.wall_s).map(duration))),
+        ("largest |div u|, all runs", cell(divergence.map(|d| format!("{d:.1e} 1/s")))),
     ];
     html! {
         (properties(&rows.map(|(name, value)| (html! { (name) }, value))))

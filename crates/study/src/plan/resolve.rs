@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_run::case::{Case, CaseError, Problem};
+use grainwake_run::case::{Case, CaseError, ClosedForms, Problem};
 use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -22,8 +22,10 @@ impl Plan {
     /// [`StudyError::Invalid`] with the problems of the first invalid model, located in the study
     /// file where it sets the key.
     pub fn resolve(study: &Study, sets: &[String]) -> Result<Plan, StudyError> {
+        let shapes = ClosedForms::default();
+        let all = (0..study.models.len()).into_par_iter();
         let resolved: Vec<Result<Vec<Run>, StudyError>> =
-            (0..study.models.len()).into_par_iter().map(|i| runs_of(study, i, sets)).collect();
+            all.map(|i| runs_of(study, i, sets, &shapes)).collect();
         let mut runs = Vec::new();
         for found in resolved {
             runs.extend(found?);
@@ -52,12 +54,18 @@ fn check_names(study: &Study, runs: &[Run]) -> Result<(), StudyError> {
 }
 
 /// Returns the runs of a model: one, or the members of its ensemble.
-fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, StudyError> {
+fn runs_of(
+    study: &Study,
+    index: usize,
+    sets: &[String],
+    shapes: &ClosedForms,
+) -> Result<Vec<Run>, StudyError> {
     let model = &study.models[index];
     let own = model.settings.iter().map(|s| s.text());
     let set: Vec<String> = own.chain(sets.iter().cloned()).collect();
     let load = |set: &[String]| {
-        Case::load(&model.base, set).map_err(|error| locate_in_study(study, model, error))
+        Case::load_sharing(&model.base, set, shapes)
+            .map_err(|error| locate_in_study(study, model, error))
     };
     let case = load(&set)?;
     let mut runs = vec![run(model, 0, set.clone(), &case)];
@@ -66,7 +74,7 @@ fn runs_of(study: &Study, index: usize, sets: &[String]) -> Result<Vec<Run>, Stu
         for member in 1..ensemble.members {
             let mut set = set.clone();
             set.extend(member_overrides(study, model, ensemble, member, &case)?);
-            let case = Case::load(&model.base, &set)
+            let case = Case::load_sharing(&model.base, &set, shapes)
                 .map_err(|error| locate_in_ensemble(study, ensemble, model, member, error))?;
             runs.push(run(model, member, set, &case));
         }

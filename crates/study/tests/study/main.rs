@@ -6,6 +6,7 @@ mod files;
 mod findings;
 mod kissing;
 mod measure;
+mod misses;
 mod report;
 mod runs;
 mod settling;

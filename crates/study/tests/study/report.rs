@@ -175,7 +175,7 @@ fn a_complete_study_has_all_figures() {
     assert!(page.contains("65 of 65 runs are finished") && !page.contains("Missing or left out"));
     assert_eq!(page.matches("<figure").count(), 18);
     assert!(
-        page.contains("<b>Shortest first contact</b>: g16-o3"),
+        page.contains("<b>Shortest first contact, by model</b>: g16-o3"),
         "the roundest, most spherical, broad side down"
     );
     let gaps = closest_gaps(&folder);

@@ -68,7 +68,12 @@ impl Context<'_> {
 
     fn figure(&self, raw: RawFigure) -> Result<FigureSpec, Problem> {
         let curves = raw.reference.len() + raw.history.len() + raw.results.len();
-        let sources = raw.reference.iter().filter_map(|r| r.source.clone()).collect();
+        let mut sources: Vec<String> = Vec::new();
+        for source in raw.reference.iter().filter_map(|r| r.source.as_ref()) {
+            if !sources.contains(source) {
+                sources.push(source.clone());
+            }
+        }
         let content = match (raw.field, raw.x, raw.y) {
             (Some(field), None, None) if curves == 0 && !raw.picture.is_empty() => {
                 for picture in &raw.picture {

@@ -10,7 +10,7 @@ fn durations_and_times_read_well() {
     event.confirmed = 0.25;
     event.gap = Some(1.25e-5);
     event.tilt = Some(std::f64::consts::FRAC_PI_4);
-    let expected = ["certain at 0.25000 s", "gap 0.0125 mm", "pair 45.0° from the vertical"];
+    let expected = ["certain at 0.25000 s", "gap 12.5 µm", "pair 45.0° from the vertical"];
     assert_eq!(details(&event), expected);
 }
 

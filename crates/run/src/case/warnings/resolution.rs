@@ -23,6 +23,8 @@ const CONTACT_DOMINATES: f64 = 0.5;
 const UNSTABLE_CFL: f64 = 1.0;
 /// Cells per diameter below which forces are rough.
 const COARSE: f64 = 8.0;
+/// Cells per diameter below which a run may become unstable.
+const MAY_FAIL: f64 = 4.0;
 /// Estimated error of the drag from which the resolution is a reason for a warning.
 const LARGEST_DRAG_ERROR: f64 = 0.05;
 /// Step over the longest one that follows the formulas from which it is a reason for a warning.
@@ -37,7 +39,11 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
     // The number counts as printed: a measured diameter of 7.98 cells is no reason for a warning.
     let printed = |n: f64| (10.0 * n).round() / 10.0;
     if let Some(n) = e.cells_per_diameter.map(printed).filter(|n| *n < COARSE) {
-        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough; {finer}"));
+        let unstable = match n < MAY_FAIL {
+            true => format!(", and below {MAY_FAIL:.0} the run may become unstable"),
+            false => String::new(),
+        };
+        found.push(format!("only {n:.1} cells across the smallest grain: below {COARSE:.0} forces are rough{unstable}; {finer}"));
     }
     if let Some(n) = e.cells_across_shortest_axis.map(printed).filter(|n| *n < THIN) {
         found.push(format!("only {n:.1} cells across the shortest axis of the thinnest grain: below {THIN:.0} forces are rough; {finer}"));

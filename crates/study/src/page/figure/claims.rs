@@ -4,13 +4,14 @@ use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{FAINT, GREEN, INK, PAGE, SMALL, VERMILION};
+use grainwake_plot::style::{FAINT, GREEN, INK, PAGE, SMALL, TEXT, VERMILION};
 use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
 use crate::analysis::claim_test::Effect;
+use crate::analysis::observation::unique;
 use crate::analysis::verdict::{Finding, Verdict};
-use crate::format::title;
+use crate::page::label::label;
 
 /// Width of the column of the claims [pt].
 const LEFT: f64 = 262.0;
@@ -20,17 +21,20 @@ const SPACE: f64 = 5.0;
 /// Height of the axis below a panel, and of the space below that [pt].
 const AXIS: f64 = 40.0;
 
-/// Draws one panel per kind of effect, with one row per claim.
+/// Length of the arrow of an effect without bound [pt].
+const ARROW: f64 = 5.0;
+
+/// Draws one panel per kind of effect, of differences one per quantity, with one row per claim, and
+/// a list of the claims without a test.
 pub fn figure(data: &FigureData) -> Option<Figure> {
-    let known = data.findings.iter().filter(|f| f.interval.is_some() && f.value.is_some());
-    let known: Vec<&Finding> = known.collect();
-    let kinds = [Effect::RankCorrelation, Effect::Difference, Effect::RelativeDifference];
-    let panels = kinds.map(|kind| -> Vec<Row> {
-        known.iter().filter(|f| f.effect == kind).filter_map(|f| Row::new(f)).collect()
-    });
-    if panels.iter().all(Vec::is_empty) {
+    let (known, untested): (Vec<&Finding>, Vec<&Finding>) =
+        data.findings.iter().partition(|f| f.interval.is_some() && f.value.is_some());
+    if known.is_empty() {
         return None;
     }
+    let panels = panels(&known);
+    let untested: Vec<Vec<String>> =
+        untested.iter().map(|f| wrapped(&f.claim, PAGE - 20.0)).collect();
     let entry = |verdict: Verdict| Entry {
         name: verdict.to_string(),
         colour: colour(verdict),
@@ -40,21 +44,35 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let verdicts = [Verdict::Holds, Verdict::Contradicted, Verdict::Open];
     let legend = Legend::new(verdicts.into_iter().map(entry), PAGE - LEFT);
     let mut top = legend.height() + 8.0;
-    let of_panel = |rows: &Vec<Row>| match rows.is_empty() {
-        true => 0.0,
-        false => height(rows) + AXIS,
-    };
-    let total = top + panels.iter().map(of_panel).sum::<f64>();
+    let list = untested.iter().map(|lines| LINE * lines.len() as f64 + SPACE).sum::<f64>();
+    let list = if untested.is_empty() { 0.0 } else { list + LINE + SPACE };
+    let total = top + panels.iter().map(|(_, rows)| height(rows) + AXIS).sum::<f64>() + list;
     let mut drawing = Drawing::new(PAGE, total);
     legend.draw(&mut drawing, (LEFT, 5.0));
-    for (kind, rows) in kinds.into_iter().zip(&panels).filter(|(_, rows)| !rows.is_empty()) {
-        panel(&mut drawing, kind, rows, top)?;
-        top += of_panel(rows);
+    for (across, rows) in &panels {
+        panel(&mut drawing, across.clone(), rows, top);
+        top += height(rows) + AXIS;
     }
-    let caption = "Estimated effects of the claims with their 95 % intervals; an interval that \
-                   reaches the edge of a panel may have no bound. Shaded: effects that do not \
-                   matter, where the analysis states them. The rule of the verdicts is given above \
-                   the table of claims.";
+    if !untested.is_empty() {
+        drawing.label((0.0, top + LINE), Anchor::Start, TEXT, INK, "Not tested: too few data");
+        top += LINE + SPACE;
+        for lines in &untested {
+            for line in lines {
+                top += LINE;
+                drawing.label((10.0, top), Anchor::Start, SMALL, FAINT, &text::literal(line));
+            }
+            top += SPACE;
+        }
+    }
+    let mut caption = "Estimated effects of the claims with their 95 % intervals. Shaded: effects \
+                       that do not matter, where the analysis states them. The rule of the \
+                       verdicts is given above the table of claims."
+        .to_owned();
+    let unbounded = |row: &Row| row.interval.iter().any(|end| end.is_infinite());
+    if panels.iter().any(|(_, rows)| rows.iter().any(unbounded)) {
+        caption += " Arrow with ∞: no bound on this side, because of models without the event; \
+                    without a dot the effect itself has none.";
+    }
     Some(Figure::new("claims", "Claims with their effects", caption, drawing))
 }
 
@@ -79,12 +97,8 @@ impl Row {
     fn new(finding: &Finding) -> Option<Row> {
         // Relative differences are shown in percent.
         let scale = if finding.effect == Effect::RelativeDifference { 100.0 } else { 1.0 };
-        let claim = match finding.effect {
-            Effect::Difference => format!("{} [{}]", finding.claim, title(&finding.quantity)),
-            _ => finding.claim.clone(),
-        };
         Some(Row {
-            lines: wrapped(&claim, LEFT - 10.0),
+            lines: wrapped(&finding.claim, LEFT - 10.0),
             value: scale * finding.value?,
             interval: finding.interval?.map(|end| scale * end),
             negligible: finding.negligible.map(|size| scale * size),
@@ -101,21 +115,58 @@ fn height(rows: &[Row]) -> f64 {
     rows.iter().map(Row::height).sum()
 }
 
-fn panel(drawing: &mut Drawing, kind: Effect, rows: &[Row], top: f64) -> Option<()> {
-    let across = match kind {
-        Effect::RankCorrelation => Axis::linear("rank correlation", -1.0, 1.0, 4, AxisRange::Tight),
-        Effect::Difference | Effect::RelativeDifference => {
-            let sizes = rows.iter().filter_map(|row| row.negligible);
-            let sizes: Vec<f64> = sizes.flat_map(|size| [-size, size]).collect();
-            let ends = rows.iter().flat_map(|row| row.interval).chain(sizes);
-            let (low, high) = extent(ends.chain([0.0]))?;
-            let label = match kind {
-                Effect::Difference => "difference, in the unit of the quantity",
-                _ => "relative difference  [%]",
-            };
-            Axis::linear(label, low, high, 5, AxisRange::Rounded)
-        }
+/// Returns the horizontal axis and the rows of each panel.
+fn panels(known: &[&Finding]) -> Vec<(Axis, Vec<Row>)> {
+    let rows = |chosen: &dyn Fn(&Finding) -> bool| -> Vec<Row> {
+        known.iter().filter(|f| chosen(f)).filter_map(|f| Row::new(f)).collect()
     };
+    let mut out = Vec::new();
+    let correlations = rows(&|f| f.effect == Effect::RankCorrelation);
+    out.push((Axis::linear("rank correlation", -1.0, 1.0, 4, AxisRange::Tight), correlations));
+    let differences = known.iter().filter(|f| f.effect == Effect::Difference);
+    for quantity in unique(differences.map(|f| &f.quantity)) {
+        let own = rows(&|f| f.effect == Effect::Difference && f.quantity == quantity);
+        out.push((axis(&format!("difference of the {}", label(&quantity)), &own), own));
+    }
+    let relative = rows(&|f| f.effect == Effect::RelativeDifference);
+    out.push((axis("relative difference  [%]", &relative), relative));
+    out.retain(|(_, rows)| !rows.is_empty());
+    out
+}
+
+/// Returns the axis of differences: zero, and all finite effects, intervals and negligible sizes.
+fn axis(label: &str, rows: &[Row]) -> Axis {
+    let of_row = |row: &Row| {
+        let size = row.negligible.unwrap_or(0.0);
+        [row.value, row.interval[0], row.interval[1], -size, size]
+    };
+    let (mut low, mut high) = extent(rows.iter().flat_map(of_row).chain([0.0])).unwrap_or_default();
+    if low == high {
+        (low, high) = (-1.0, 1.0);
+    }
+    // Zero is inside the frame, and an arrow does not hide a finite effect.
+    let room = 0.08 * (high - low);
+    low -= if low == 0.0 { room } else { 0.0 };
+    high += if high == 0.0 { room } else { 0.0 };
+    let unbounded = |end: f64| rows.iter().any(|row| of_row(row).contains(&end));
+    low -= if unbounded(f64::NEG_INFINITY) { room } else { 0.0 };
+    high += if unbounded(f64::INFINITY) { room } else { 0.0 };
+    Axis::linear(label, low, high, 5, AxisRange::Rounded)
+}
+
+/// Draws an arrow at the edge of the frame, with its number, for an effect without bound.
+fn arrow(drawing: &mut Drawing, frame: &Frame, y: f64, end: f64, colour: &str) {
+    let sign = end.signum();
+    let edge = if sign > 0.0 { frame.x + frame.width } else { frame.x };
+    let tip = (edge - sign, y);
+    let back = tip.0 - sign * ARROW;
+    let head = [(back, y - 0.6 * ARROW), tip, (back, y + 0.6 * ARROW)];
+    drawing.line(&head, colour, 1.2, None);
+    let (anchor, name) = if sign > 0.0 { (Anchor::End, "∞") } else { (Anchor::Start, "−∞") };
+    drawing.label((back - sign, y - 2.0), anchor, SMALL, INK, name);
+}
+
+fn panel(drawing: &mut Drawing, across: Axis, rows: &[Row], top: f64) {
     let height = height(rows);
     let mut up = Axis::linear("", 0.0, height, 1, AxisRange::Tight);
     up.ticks.clear();
@@ -135,14 +186,18 @@ fn panel(drawing: &mut Drawing, kind: Effect, rows: &[Row], top: f64) -> Option<
         let ends = row.interval.map(|end| (frame.px(inside(end)), middle));
         let colour = colour(row.verdict);
         drawing.line(&ends, colour, 1.2, None);
-        let place = (frame.px(inside(row.value)), middle);
-        Marker::Circle.draw(drawing, place, 2.7, colour, Fill::Solid);
+        for end in row.interval.into_iter().filter(|end| end.is_infinite()) {
+            arrow(drawing, &frame, middle, end, colour);
+        }
+        if row.value.is_finite() {
+            let place = (frame.px(row.value), middle);
+            Marker::Circle.draw(drawing, place, 2.7, colour, Fill::Solid);
+        }
         y += row.height();
     }
     let zero = frame.px(0.0);
     drawing.line(&[(zero, top), (zero, top + height)], INK, 0.6, Some("2 2"));
     frame.outline(drawing, Labelled { across: true, up: false });
-    Some(())
 }
 
 /// Breaks a text into lines of at most a width [pt].
@@ -158,4 +213,55 @@ fn wrapped(text: &str, width: f64) -> Vec<String> {
         }
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::plan::claims::Test;
+
+    fn finding(quantity: &str, value: f64, interval: [f64; 2]) -> Finding {
+        let order = Test::Order { axis: "a".into(), more: "b".into(), less: "c".into() };
+        Finding {
+            claim: format!("claim about {quantity}"),
+            part: String::new(),
+            quantity: quantity.into(),
+            test: order,
+            when: BTreeMap::new(),
+            observed: false,
+            verdict: Verdict::Open,
+            says: String::new(),
+            n: 6,
+            censored: 0,
+            effect: Effect::Difference,
+            value: Some(value),
+            interval: Some(interval),
+            p: Some(0.5),
+            adjusted_p: None,
+            negligible: None,
+        }
+    }
+
+    #[test]
+    fn each_quantity_has_a_panel_and_an_effect_without_bound_an_arrow() {
+        let infinite = f64::INFINITY;
+        let all = [
+            finding("kiss_time", infinite, [1.0, infinite]),
+            finding("kisses", 1.0, [0.0, 2.0]),
+            finding("kiss_time", 3.0, [2.0, 4.0]),
+        ];
+        let panels = panels(&all.iter().collect::<Vec<_>>());
+        let sizes: Vec<usize> = panels.iter().map(|(_, rows)| rows.len()).collect();
+        assert_eq!(sizes, [2, 1]);
+        let (axis, rows) = &panels[0];
+        assert!(axis.label.contains("kissing time") && axis.high() > 4.0, "{}", axis.label);
+        let mut drawing = Drawing::new(PAGE, 100.0);
+        panel(&mut drawing, axis.clone(), rows, 10.0);
+        let svg = drawing.to_svg("", "", "");
+        assert_eq!(svg.matches('∞').count(), 1, "{svg}");
+        // One dot of radius 2.7 for the finite effect only.
+        assert_eq!(svg.matches("stroke=\"#ffffff\"").count(), 1, "{svg}");
+    }
 }

@@ -8,14 +8,15 @@ use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
+use super::legend::{LineStyle, OUTSIDE};
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
 use crate::analysis::observation::unique;
 use crate::analysis::verdict::Finding;
-use crate::format::title;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
+use crate::page::label::name_of;
 use crate::plan::{Plan, Run};
 
 /// Smallest number of significant digits of a value with decimals.
@@ -23,8 +24,10 @@ const DIGITS: usize = 3;
 
 /// Data of the figures.
 pub struct FigureData<'a> {
-    /// Plan.
+    /// Plan of the shown runs.
     pub plan: &'a Plan,
+    /// Plan of all runs of the study.
+    pub whole: &'a Plan,
     /// Records of the runs, in the order of the plan.
     pub records: &'a [RunRecord],
     /// Study folder.
@@ -61,6 +64,18 @@ impl FigureData<'_> {
     /// Returns the levels of an axis, in the order of the runs.
     pub fn levels(&self, axis: &str) -> Vec<String> {
         unique(self.plan.runs.iter().filter_map(|run| run.levels.get(axis)))
+    }
+
+    /// Returns all levels of an axis of the study, shown or not, in the order of the study file.
+    pub fn declared(&self, axis: &str) -> Vec<String> {
+        unique(self.whole.runs.iter().filter_map(|run| run.levels.get(axis)))
+    }
+
+    /// Returns the style of a level of an axis, the same in all figures.
+    pub fn level_style(&self, axis: &str, level: &str) -> LineStyle {
+        let all = self.declared(axis);
+        let n = all.iter().position(|l| l == level);
+        n.map_or(OUTSIDE, |n| LineStyle::of_level(n, all.len()))
     }
 
     /// Returns the distinct values of a factor among the models on the axes, in ascending order.
@@ -104,7 +119,7 @@ impl FigureData<'_> {
             Some(own) if !others.any(|o| o != factor && initial(o).as_ref() == Some(&own)) => {
                 format!("*{own}*")
             }
-            _ => text::literal(&title(factor)),
+            _ => name_of(factor),
         }
     }
 }
@@ -185,8 +200,10 @@ mod tests {
             "commit": null, "runs": values.iter().map(run).collect::<Vec<_>>(),
             "analysis": { "figures": { "rows": factors[0], "columns": factors[1] } },
         });
+        let plan: Plan = serde_json::from_value(plan).unwrap();
         check(&FigureData {
-            plan: &serde_json::from_value(plan).unwrap(),
+            plan: &plan,
+            whole: &plan,
             records: &[],
             folder: Path::new(""),
             findings: &[],

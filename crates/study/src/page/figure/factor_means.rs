@@ -1,17 +1,17 @@
 //! Means of quantities against factors, with their 95 % intervals.
 
+use grainwake_plot::Figure;
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Fill, Frame, Labelled};
 use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
-use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
 use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::factor_mean::{FactorMean, KISSING_SHARE};
 use crate::analysis::observation::unique;
-use crate::format::title;
+use crate::page::label::label;
 
 const LEFT: f64 = 42.0;
 const GAP: f64 = 14.0;
@@ -36,9 +36,10 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     if levels.is_empty() {
         return None;
     }
-    let style = |l: usize| LineStyle::of_level(l, levels.len());
-    let entry = |(l, level): (usize, &String)| symbol_entry(level, style(l));
-    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
+    let by = &data.plan.analysis.correlations.as_ref()?.by;
+    let style = |level: &String| data.level_style(by, level);
+    let entry = |level: &String| symbol_entry(level, style(level));
+    let legend = Legend::new(levels.iter().map(entry), PAGE - LEFT);
     let top = legend.height() + 8.0;
     let row_height = HEIGHT + SPACE;
     let block = row_height * quantities.len() as f64 + FOOT;
@@ -70,7 +71,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
                 let curve = shown().filter(|m| m.level == *level);
                 let curve: Vec<(f64, &FactorMean)> =
                     curve.map(|m| (frame.px(m.at) + aside, m)).collect();
-                let LineStyle { colour, dash, sign } = style(l);
+                let LineStyle { colour, dash, sign } = style(level);
                 let line: Vec<(f64, f64)> =
                     curve.iter().map(|(x, m)| (*x, frame.py(m.mean))).collect();
                 drawing.line(&line, colour, 0.6, dash);
@@ -87,13 +88,26 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             frame.outline(&mut drawing, Labelled { across, up: n == 0 });
         }
     }
-    let left_out = match quantities.iter().any(|quantity| quantity == KISSING_SHARE) {
+    let shares = quantities.iter().filter(|quantity| *quantity == KISSING_SHARE).count();
+    let bars = match (shares, quantities.len() - shares) {
+        (0, _) => "of a bootstrap over models and members",
+        (_, 0) => "of Clopper and Pearson with models as units",
+        _ => {
+            "of the share those of Clopper and Pearson with models as units, else those of a \
+             bootstrap over models and members"
+        }
+    };
+    let without = match means.iter().any(|m| m.interval.is_none()) {
+        true => " A mean without a bar is that of a single run.",
+        false => "",
+    };
+    let left_out = match shares > 0 {
         true => "A pair that lands before the event counts in the kissing share only.",
         false => "A run that ends before the event of a quantity is left out.",
     };
     let caption = format!(
-        "Mean over the models with equal or similar values of a factor; bars: 95 % intervals of a \
-         bootstrap over models and members. {left_out}"
+        "Mean over the models with equal or similar values of a factor; bars: 95 % intervals, \
+         {bars}.{without} {left_out}"
     );
     Some(Figure::new("factor-means", "Results against factors", caption, drawing))
 }
@@ -131,10 +145,6 @@ impl Column {
         let axis = Axis::linear(&label(factor), first, last, ticks, AxisRange::Tight);
         Some(Column { factor: factor.to_owned(), axis, aside })
     }
-}
-
-fn label(name: &str) -> String {
-    text::literal(&title(name))
 }
 
 #[cfg(test)]

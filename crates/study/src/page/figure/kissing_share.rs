@@ -8,7 +8,6 @@ use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, letter, text};
 
 use super::data::FigureData;
-use super::legend::LineStyle;
 use crate::analysis::kissing::Level;
 use crate::analysis::observation::unique;
 
@@ -35,10 +34,12 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let panels = grids.len().max(1);
     let across = panels.min(ACROSS);
     let width = (PAGE - LEFT - 8.0 - GAP * (across as f64 - 1.0)) / across as f64;
-    let entry = |(i, name): (usize, &String)| {
-        Entry::line(text::literal(name), LineStyle::nth(i).colour, LineStyle::nth(i).dash)
+    let by = &data.plan.analysis.kissing.as_ref()?.by;
+    let entry = |name: &String| {
+        let style = data.level_style(by, name);
+        Entry::line(text::literal(name), style.colour, style.dash)
     };
-    let legend = Legend::new(names.iter().enumerate().map(entry), PAGE - LEFT);
+    let legend = Legend::new(names.iter().map(entry), PAGE - LEFT);
     let top = legend.height() + 8.0;
     let rows = panels.div_ceil(across) as f64;
     let mut drawing = Drawing::new(PAGE, top + rows * (HEIGHT + TITLE) + 26.0);
@@ -59,8 +60,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
         }
         for level in shown.iter().filter(|l| l.grid.as_ref() == grids.get(panel)) {
-            let n = names.iter().position(|name| *name == level.level).unwrap_or(0);
-            let style = LineStyle::nth(n);
+            let style = data.level_style(by, &level.level);
             let clip = format!("clip-share-{panel}-{}", level.level);
             frame.curve(&mut drawing, &steps(level, end), style.colour, style.dash, &clip);
         }

@@ -4,19 +4,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::{Anchor, Drawing};
-use grainwake_plot::frame::{Fill, Frame, Labelled, Marker};
+use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::legend::{Entry, Legend};
 use grainwake_plot::style::{BLUE, HAIR, INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
-use super::legend::{LineStyle, symbol_entry};
+use super::legend::{OUTSIDE, symbol_entry};
+use super::misses::{self, STRIP};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;
-use crate::format::{missed, significant, title};
+use crate::format::{missed, significant};
+use crate::page::label::{label, name_of};
 
 const SHADES: [&str; 2] = ["#e9e9ec", "#f6f6f8"];
-const LABEL: &str = "kissing time  *t* √(*g*/*d*)  [–]";
 const LEFT: f64 = 38.0;
 /// Top edge of the frame without a legend, and vertical position of a legend [pt].
 const TOP: f64 = 8.0;
@@ -40,10 +41,12 @@ fn layout<'a>(data: &'a FigureData, height: f64) -> Option<Layout<'a>> {
     let all = observations(data.records, "kiss_time", &BTreeMap::new());
     let reference = request.reference.as_ref();
     let found = reference.and_then(|name| all.iter().find(|o| o.model == *name)).cloned();
-    let (_, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, o.value]))?;
+    let kissed = all.iter().filter(|o| o.occurred());
+    let (_, high) = extent(kissed.map(|o| o.range.1))?;
+    let strip = if all.iter().any(|o| o.censored) { STRIP } else { 0.0 };
     let ticks = short_names(&grains).into_iter().chain(reference.cloned());
     let ticks = ticks.map(|name| text::literal(&name)).collect();
-    let across = Axis::categories(&text::literal(&title(axis)), ticks);
+    let across = Axis::categories(&name_of(axis), ticks);
     let mut blocks: Vec<(usize, usize, f64)> = Vec::new();
     for (i, grain) in grains.iter().enumerate() {
         let run = data.run_at(axis, grain)?;
@@ -61,12 +64,12 @@ fn layout<'a>(data: &'a FigureData, height: f64) -> Option<Layout<'a>> {
         all,
         frame: Frame {
             x: LEFT,
-            y: TOP,
+            y: TOP + strip,
             width: PAGE - LEFT - 8.0,
             height,
             across,
             // Room for the labels of the blocks.
-            up: Axis::linear(LABEL, 0.0, 1.12 * high, 5, AxisRange::Rounded),
+            up: Axis::linear(&label("kiss_time"), 0.0, 1.12 * high, 5, AxisRange::Rounded),
         },
         blocks,
     })
@@ -113,8 +116,11 @@ impl Layout<'_> {
                 drawing.text((middle, f.y + 9.0), Anchor::Middle, &label);
             }
         }
-        if let Some(reference) = &self.reference {
+        if let Some(reference) = self.reference.as_ref().filter(|o| !o.censored) {
             f.level(&mut drawing, reference.value);
+        }
+        if self.censored() > 0 {
+            misses::strip(&mut drawing, f, true);
         }
         drawing
     }
@@ -122,17 +128,6 @@ impl Layout<'_> {
     /// Horizontal coordinate of the reference, to the right of all grains.
     fn reference_position(&self) -> f64 {
         self.grains.len() as f64 + 0.5
-    }
-
-    /// Draws the symbol of an observation and the bar of its range.
-    fn mark(&self, drawing: &mut Drawing, at: f64, o: &Observation, sign: Marker, colour: &str) {
-        let f = &self.frame;
-        let x = f.px(at);
-        if o.range.1 > o.range.0 {
-            let bar = [(x, f.py(o.range.0)), (x, f.py(o.range.1))];
-            drawing.line(&bar, colour, 0.9, None);
-        }
-        sign.draw(drawing, (x, f.py(o.value)), 2.9, colour, Fill::of_bound(o.censored));
     }
 
     fn censored(&self) -> usize {
@@ -146,16 +141,18 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     let mut layout = layout(data, 190.0)?;
     let orientations = request.orientations.as_ref();
     let levels = orientations.map(|axis| data.levels(axis)).unwrap_or_default();
-    let style = |n: usize| LineStyle::of_level(n, levels.len());
-    let entry = |(n, name): (usize, &String)| symbol_entry(name, style(n));
-    let mut entries: Vec<Entry> = levels.iter().enumerate().map(entry).collect();
+    let style = |level: Option<&String>| match (orientations, level) {
+        (Some(axis), Some(level)) => data.level_style(axis, level),
+        _ => OUTSIDE,
+    };
+    let entry = |name: &String| symbol_entry(name, style(Some(name)));
+    let mut entries: Vec<Entry> = levels.iter().map(entry).collect();
     let censored = layout.censored();
     if censored > 0 {
-        let name = "hollow: landed, or run ended, before kissing";
-        entries.push(Entry::symbol(name, INK, Marker::Circle, Fill::Hollow));
+        entries.push(misses::entry());
     }
     let legend = Legend::new(entries, PAGE - LEFT);
-    layout.frame.y = legend.height() + 10.5;
+    layout.frame.y += legend.height() + 10.5 - TOP;
     let mut drawing = layout.drawing(data);
     legend.draw(&mut drawing, (LEFT, LEGEND));
     for observation in &layout.all {
@@ -169,12 +166,12 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
             0 | 1 => 0.0,
             count => 0.6 * n as f64 / (count - 1) as f64 - 0.3,
         };
-        let at = i as f64 + 0.5 + shift;
-        layout.mark(&mut drawing, at, observation, style(n).sign, style(n).colour);
+        let x = layout.frame.px(i as f64 + 0.5 + shift);
+        misses::mark(&mut drawing, &layout.frame, x, observation, style(level));
     }
     if let Some(reference) = &layout.reference {
-        let at = layout.reference_position();
-        layout.mark(&mut drawing, at, reference, Marker::nth(0), INK);
+        let x = layout.frame.px(layout.reference_position());
+        misses::mark(&mut drawing, &layout.frame, x, reference, OUTSIDE);
     }
     layout.frame.outline(&mut drawing, Labelled::BOTH);
     let count = layout.all.len();
@@ -182,19 +179,19 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     if let Some(rows) = &request.rows {
         caption += &format!(" Blocks: grains of equal {rows}.");
     }
-    if let Some(reference) = &layout.reference {
+    if let Some(reference) = layout.reference.as_ref().filter(|o| !o.censored) {
         caption += &format!(" Dashed line: {}.", text::literal(&reference.model));
     }
     caption += &match data.records.iter().map(|r| r.member).max() {
         None | Some(0) => " Each symbol is one run.".to_owned(),
         Some(members) => format!(
-            " Symbols are medians and bars the range of up to {} runs with small changes of their \
-             start.",
+            " Symbols are medians over up to {} runs with small changes of their start, runs \
+             without a kiss last; bars are the range of the kisses.",
             members + 1
         ),
     };
     if censored > 0 {
-        caption += &format!(" {} the kiss.", missed(censored));
+        caption += &format!(" Hollow, above the axis: {} no kissing time.", missed(censored));
     }
     let title = "Kissing time of all models";
     Some(Figure::new("fig14a-kissing-time", title, caption, drawing).numbered("14a"))
@@ -210,7 +207,9 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     let mut widest: Option<(f64, &String)> = None;
     for (i, grain) in layout.grains.iter().enumerate() {
         let own = layout.all.iter().filter(|o| o.levels.get(layout.axis) == Some(grain));
-        let values: Vec<f64> = own.map(|o| o.value).collect();
+        let (missing, kissed): (Vec<_>, Vec<_>) = own.partition(|o| o.censored);
+        misses::number(&mut drawing, f, f.px(i as f64 + 0.5), missing.len());
+        let values: Vec<f64> = kissed.iter().map(|o| o.value).collect();
         if values.is_empty() {
             continue;
         }
@@ -234,22 +233,21 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
         drawing.line(&median, INK, 1.4, None);
     }
     if let Some(reference) = &layout.reference {
-        let place = (f.px(layout.reference_position()), f.py(reference.value));
-        Marker::Circle.draw(&mut drawing, place, 2.9, INK, Fill::of_bound(reference.censored));
+        misses::mark(&mut drawing, f, f.px(layout.reference_position()), reference, OUTSIDE);
     }
     f.outline(&mut drawing, Labelled::BOTH);
     let (width, grain) = widest?;
     let mut caption = format!(
-        "Kissing times over the orientations of each grain: minimum, lower quartile, median, upper \
-         quartile and maximum. The range is largest for {}: {}.",
+        "Kissing times over the orientations in which each grain kisses: minimum, lower quartile, \
+         median, upper quartile and maximum. The range is largest for {}: {}.",
         text::literal(grain),
         significant(width)
     );
     let censored = layout.censored();
     if censored > 0 {
         caption += &format!(
-            " The {censored} pairs without a kiss are included with the time of their landing or \
-             of the end of the run."
+            " Numbers above the axis: orientations of the grain without a kiss, {censored} in all; \
+             their pairs landed, or their runs ended, before."
         );
     }
     let title = "Spread of the kissing time by grain";

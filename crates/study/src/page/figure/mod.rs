@@ -8,6 +8,7 @@ mod histories;
 mod kissing_share;
 mod kissing_time;
 mod legend;
+mod misses;
 mod overview;
 mod panels;
 mod setup;

@@ -42,9 +42,7 @@ pub fn figures(data: &FigureData) -> Vec<Figure> {
             name: "kissing-time",
             title: "Kissing time",
             up: "kissing time  *t* √(*g*/*d*)  [–]",
-            caption: "First contact against the varied parameters. Hollow symbols: no \
-                      contact before the landing or the end of the run, whose time is shown."
-                .into(),
+            caption: "First contact against the varied parameters.".into(),
         };
         out.extend(against_parameters(data, "kiss_time", texts));
     }
@@ -110,7 +108,8 @@ fn against_time(
     let (_, end) = extent(points().map(|p| p.0))?;
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
     let styles = LineStyles::of(data);
-    let legend = styles.legend(LEFT, false);
+    let drawn: Vec<&Run> = curves.iter().map(|(run, _)| *run).collect();
+    let legend = styles.legend(&drawn, LEFT, false);
     if legend.height() == 0.0 {
         texts.caption += " The models are too many for a legend.";
     }

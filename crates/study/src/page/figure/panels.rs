@@ -4,15 +4,18 @@ use std::collections::BTreeMap;
 
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
-use grainwake_plot::frame::{Fill, Frame, Labelled};
+use grainwake_plot::frame::{Frame, Labelled};
 use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
 use super::legend::{LineStyles, axes};
-use crate::analysis::observation::{Observation, observations, other_levels, unique};
-use crate::format::title;
+use super::misses::{self, STRIP};
+use crate::analysis::observation::{Observation, is_time, observations, other_levels, unique};
+use crate::format::missed;
+use crate::page::label::label;
+use crate::plan::Run;
 use crate::plan::quantities::SHAPE_FACTORS;
 
 /// Texts of a figure.
@@ -56,7 +59,7 @@ struct Parameter {
 impl Parameter {
     /// Returns the horizontal axis; none without coordinates.
     fn across(&self) -> Option<Axis> {
-        let label = text::literal(&title(&self.name));
+        let label = label(&self.name);
         if let Some(names) = &self.names {
             let names = names.iter().map(|name| text::literal(name)).collect();
             return Some(Axis::categories(&label, names));
@@ -143,14 +146,18 @@ pub(super) fn against_parameters(
     if all.iter().all(|o| o.censored) {
         return None;
     }
-    let (low, high) = extent(all.iter().flat_map(|o| [o.range.0, o.range.1, 0.0]))?;
+    let (low, high) =
+        extent(all.iter().filter(|o| o.occurred()).flat_map(|o| [o.range.0, o.range.1, 0.0]))?;
+    let misses = all.iter().filter(|o| o.censored).count();
+    let strip = if misses > 0 { STRIP } else { 0.0 };
     let mut parameters = parameters(data);
     let left_out = parameters.len().saturating_sub(PANELS);
     parameters.truncate(PANELS);
     let styles = LineStyles::of(data);
     // Names along the axis replace the legend of a single panel.
     let named = matches!(parameters.as_slice(), [Parameter { names: Some(_), .. }]);
-    let legend = if named { Legend::default() } else { styles.legend(LEFT, true) };
+    let drawn: Vec<&Run> = all.iter().filter_map(|o| data.run(&o.model)).collect();
+    let legend = if named { Legend::default() } else { styles.legend(&drawn, LEFT, true) };
     let columns = parameters.len().min(2);
     let width = (PAGE - LEFT - 8.0 - GAP * (columns as f64 - 1.0)) / columns as f64;
     let frame = |(i, parameter): (usize, &Parameter)| {
@@ -169,13 +176,16 @@ pub(super) fn against_parameters(
     let mut bottom = legend.height() + 4.0;
     for row in frames.chunks_mut(columns) {
         let foot = row.iter().map(Frame::foot).fold(0.0, f64::max);
-        row.iter_mut().for_each(|frame| frame.y = bottom);
-        bottom += HEIGHT + foot + 4.0;
+        row.iter_mut().for_each(|frame| frame.y = bottom + strip);
+        bottom += strip + HEIGHT + foot + 4.0;
     }
     let mut drawing = Drawing::new(PAGE, bottom);
     legend.draw(&mut drawing, (LEFT, 5.0));
     for (i, (parameter, frame)) in parameters.iter().zip(&frames).enumerate() {
         frame.grid(&mut drawing);
+        if misses > 0 {
+            misses::strip(&mut drawing, frame, i % columns == 0);
+        }
         draw_panel(&mut drawing, frame, parameter, &all, data, &styles);
         frame.outline(&mut drawing, Labelled { across: true, up: i % columns == 0 });
     }
@@ -185,7 +195,16 @@ pub(super) fn against_parameters(
         caption += &format!(" {} of {models} models have a value.", all.len());
     }
     if data.plan.runs.iter().any(|r| r.member > 0) {
-        caption += " Symbols are medians and bars the range over an ensemble.";
+        caption += match is_time(quantity) {
+            true => {
+                " Symbols are medians over an ensemble, runs without the event last; bars are the \
+                 range of the events."
+            }
+            false => " Symbols are means and bars the range over an ensemble.",
+        };
+    }
+    if misses > 0 {
+        caption += &format!(" Hollow symbols above the axis: {} no time.", missed(misses));
     }
     if left_out > 0 {
         caption += &format!(" {left_out} more axes or factors are not shown.");
@@ -205,27 +224,24 @@ fn draw_panel(
         let x = *parameter.coordinates.get(&o.model)?;
         Some((frame.px(x), frame.py(o.value)))
     };
-    // Models that differ only on this axis are joined.
+    // Models that differ only on this axis are joined, except across one without the event.
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
     for observation in all {
         if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
+            let point = if observation.censored { (point.0, f64::NAN) } else { point };
             lines.entry(other_levels(&observation.levels, axis)).or_default().push(point);
         }
     }
     for line in lines.values_mut() {
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
-        drawing.line(line, "#b4b4b8", 0.7, None);
+        for part in line.split(|point| point.1.is_nan()).filter(|part| part.len() > 1) {
+            drawing.line(part, "#b4b4b8", 0.7, None);
+        }
     }
     for observation in all {
-        let (Some((x, y)), Some(run)) = (at(observation), data.run(&observation.model)) else {
+        let (Some((x, _)), Some(run)) = (at(observation), data.run(&observation.model)) else {
             continue;
         };
-        let style = styles.style(run);
-        let (low, high) = observation.range;
-        if high > low {
-            let bar = [(x, frame.py(low)), (x, frame.py(high))];
-            drawing.line(&bar, style.colour, 0.9, None);
-        }
-        style.sign.draw(drawing, (x, y), 3.0, style.colour, Fill::of_bound(observation.censored));
+        misses::mark(drawing, frame, x, observation, styles.style(run));
     }
 }

@@ -10,7 +10,7 @@ use grainwake_plot::{Figure, text};
 use super::data::FigureData;
 use super::legend::{LineStyle, symbol_entry};
 use crate::analysis::correlation::Correlation;
-use crate::format::title;
+use crate::page::label::name_of;
 
 /// Beginning of the label of a panel.
 const QUANTITY: &str = "rank correlation with";
@@ -38,9 +38,9 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let (across, labels) = labels(&request.factors);
     let foot = FOOT + if labels.iter().any(|label| label.len() > 1) { LINE } else { 0.0 };
     let width = panel_width(across);
-    let style = |l: usize| LineStyle::of_level(l, levels.len());
-    let entry = |(l, level): (usize, &String)| symbol_entry(level, style(l));
-    let legend = Legend::new(levels.iter().enumerate().map(entry), PAGE - LEFT);
+    let style = |level: &String| data.level_style(&request.by, level);
+    let entry = |level: &String| symbol_entry(level, style(level));
+    let legend = Legend::new(levels.iter().map(entry), PAGE - LEFT);
     let top = legend.height() + 16.5;
     let rows = request.factors.len().div_ceil(across);
     let mut drawing = Drawing::new(PAGE, top + rows as f64 * (height + foot + SPACE) - SPACE);
@@ -64,7 +64,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
             }
             if column == 0 {
                 let place = (LEFT - 6.0, top + 0.5 * block);
-                drawing.note(place, Anchor::End, &text::literal(&title(quantity)));
+                drawing.note(place, Anchor::End, &name_of(quantity));
             }
             for (l, level) in levels.iter().enumerate() {
                 let found = known
@@ -74,7 +74,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
                     continue;
                 };
                 let y = top + 4.0 + ROW * (l as f64 + 0.5);
-                let LineStyle { colour, sign, .. } = style(l);
+                let LineStyle { colour, sign, .. } = style(level);
                 let interval = [(frame.px(low), y), (frame.px(high), y)];
                 drawing.line(&interval, colour, 1.2, None);
                 sign.draw(&mut drawing, (frame.px(rho), y), 2.7, colour, Fill::Solid);
@@ -92,7 +92,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let caption = format!(
         "Spearman's rank correlation of each quantity with each factor, over up to {n} models of \
          equal {}, with 95 % intervals. An interval that excludes zero indicates a trend.",
-        text::literal(&title(&request.by))
+        name_of(&request.by)
     );
     Some(Figure::new("correlations", "Rank correlations with factors", caption, drawing))
 }
@@ -104,7 +104,7 @@ fn panel_width(across: usize) -> f64 {
 
 /// Returns the number of panels in a row and the lines of their labels, which do not overlap.
 fn labels(factors: &[String]) -> (usize, Vec<Vec<String>>) {
-    let names: Vec<String> = factors.iter().map(|f| text::literal(&title(f))).collect();
+    let names: Vec<String> = factors.iter().map(|f| name_of(f)).collect();
     let one = |name: &String| vec![format!("{QUANTITY} {name}")];
     let two = |name: &String| vec![QUANTITY.to_owned(), name.clone()];
     let one: Vec<Vec<String>> = names.iter().map(one).collect();
@@ -134,7 +134,7 @@ mod tests {
         let (across, two) = of(&["sphericity", "roundness"]);
         assert_eq!((across, &two[0]), (2, &vec!["rank correlation with sphericity".to_owned()]));
         let (across, four) = of(&["density", "diameter", "viscosity_Pas", "krumbein_sphericity"]);
-        assert_eq!((across, &*four[3][1]), (4, "krumbein sphericity"));
+        assert_eq!((across, &*four[3][1]), (4, "Krumbein sphericity"));
         let (across, long) = of(&["density", "ratio_of_the_longest_axis_to_the_shortest_axis"]);
         assert_eq!((across, long.len()), (2, 2));
         assert_eq!(of(&["a"; 9]).0, ACROSS);
