@@ -9,7 +9,7 @@ use super::legend::LineStyle;
 use crate::analysis::observation::Observation;
 
 /// Height of the strip [pt].
-pub(super) const STRIP: f64 = 12.0;
+pub(super) const STRIP: f64 = 16.0;
 
 /// Draws the strip above a frame, with its name to the left if `named`.
 pub(super) fn strip(drawing: &mut Drawing, frame: &Frame, named: bool) {

@@ -43,6 +43,8 @@ const GAP: f64 = 14.0;
 const HEIGHT: f64 = 150.0;
 /// Largest number of panels in a figure.
 const PANELS: usize = 6;
+/// Largest number of names along an axis whose values are joined.
+const MOST_NAMES_JOINED: usize = 3;
 
 /// A varied parameter.
 struct Parameter {
@@ -224,10 +226,14 @@ fn draw_panel(
         let x = *parameter.coordinates.get(&o.model)?;
         Some((frame.px(x), frame.py(o.value)))
     };
-    // Models that differ only on this axis are joined, except across one without the event.
+    // Models that differ only on this axis are joined, except across one without the event, and
+    // among many names, which have no order.
+    let joins = parameter.names.as_ref().is_none_or(|names| names.len() <= MOST_NAMES_JOINED);
     let mut lines: BTreeMap<BTreeMap<String, String>, Vec<(f64, f64)>> = BTreeMap::new();
     for observation in all {
-        if let (Some(axis), Some(point)) = (&parameter.axis, at(observation)) {
+        if let (Some(axis), Some(point)) =
+            (parameter.axis.as_ref().filter(|_| joins), at(observation))
+        {
             let point = if observation.censored { (point.0, f64::NAN) } else { point };
             lines.entry(other_levels(&observation.levels, axis)).or_default().push(point);
         }
