@@ -103,13 +103,15 @@ impl Grey {
             let m = crop.place(n).filter(|_| distance[n] <= BAND)?;
             (self.owner[m] & !HALO == label).then(|| f64::from(self.values[m]) - void.at(n))
         };
-        let own = crop.deep_grey(depth).map(|grey| grey - void.mean).unwrap_or_else(|| {
+        // Voxels just beyond the band are slightly darkened. They are better than an estimate from
+        // the grey of other grains, which may differ, but not than one from the grain alone.
+        let limits = [Some(BAND + DEEPER), self.solid.deep.then_some(BAND)];
+        let deep = limits.into_iter().flatten().find_map(|limit| crop.deep_grey(depth, limit));
+        let own = deep.map(|grey| grey - void.mean).unwrap_or_else(|| {
             let above: Vec<f32> =
                 (0..distance.len()).map(|n| near(n).unwrap_or(0.0) as f32).collect();
             let usual = self.solid.deep.then(|| self.solid.grey - void.mean);
-            let own = estimated_grey(&above, dims, depth, usual);
-            assumed.push((Assumed::Solid, own + void.mean));
-            own
+            estimated_grey(&above, dims, depth, usual)
         });
         let share = |n: usize| -> f64 {
             // A cavity belongs to the grain for any grey value, as does its wall, which its blur
@@ -125,8 +127,8 @@ impl Grey {
         let once = gaussian(&shares, dims, sigma);
         let steep = steepness(&once, dims);
         let blur = blur(steep, sigma);
-        let free = depth.iter().filter(|d| f64::from(**d) < -CLEAR_OF_BLUR * blur).count();
-        if free < SOME_DEEP && assumed.iter().all(|(what, _)| *what != Assumed::Solid) {
+        let free = f64::from(-BAND).min(-CLEAR_OF_BLUR * blur);
+        if depth.iter().filter(|d| f64::from(**d) < free).count() < SOME_DEEP {
             assumed.push((Assumed::Solid, own + void.mean));
         }
         // Second moment of a G + (1 - a) G G: s^2 (2 - a) = -blur^2.
@@ -183,16 +185,13 @@ impl Crop<'_> {
         owner != 0 && owner & HALO == 0
     }
 
-    /// Returns the mean grey of the voxels farther from the surface and from cavities than the
-    /// blur, since grains differ; `None` if there are too few.
-    fn deep_grey(&self, depth: &[f32]) -> Option<f64> {
-        let beyond = |limit: f32| -> Vec<f64> {
-            let deep = (0..depth.len()).filter(|n| depth[*n] < limit);
-            deep.filter_map(|n| Some(f64::from(self.image.values[self.place(n)?]))).collect()
-        };
-        let mut deep = [-BAND - DEEPER, -BAND].into_iter().map(beyond);
-        let deep = deep.find(|deep| deep.len() >= SOME_DEEP)?;
-        Some(deep.iter().sum::<f64>() / deep.len() as f64)
+    /// Returns the mean grey of the voxels farther than `limit` from the surface and from cavities;
+    /// `None` if there are too few.
+    fn deep_grey(&self, depth: &[f32], limit: f32) -> Option<f64> {
+        let deep = (0..depth.len()).filter(|n| depth[*n] < -limit);
+        let deep: Vec<f64> =
+            deep.filter_map(|n| Some(f64::from(self.image.values[self.place(n)?]))).collect();
+        (deep.len() >= SOME_DEEP).then(|| deep.iter().sum::<f64>() / deep.len() as f64)
     }
 }
 
