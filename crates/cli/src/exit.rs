@@ -182,6 +182,9 @@ pub fn shape_help(error: &ShapeError) -> Option<String> {
                 "if label {label} is a whole phase: --split treats each piece as a grain, --separate also separates touching grains; if it is one grain: --largest-piece keeps the largest"
             ));
         }
+        ShapeError::Quality { cells: Some(cells), .. } => {
+            return Some(format!("--cells {cells} resolves it (default: 56)"));
+        }
         ShapeError::InsideOut { .. } => "--flip inverts its normals",
         ShapeError::TooFewVoxels { .. } => "scan at a higher resolution, or omit the grain",
         ShapeError::Malformed { .. } => {

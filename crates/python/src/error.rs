@@ -157,8 +157,8 @@ impl IntoException for ShapeError {
 }
 
 /// Returns the arguments that may remedy a refused shape, in the words of the command line.
-fn advice(error: &ShapeError) -> Option<&'static str> {
-    Some(match error {
+fn advice(error: &ShapeError) -> Option<String> {
+    let advice = match error {
         ShapeError::EmptyVolume | ShapeError::SolidVolume => {
             "check the grey values of the image; a grey image needs threshold=VALUE, \"otsu\" or \
              \"otsu3\""
@@ -175,13 +175,17 @@ fn advice(error: &ShapeError) -> Option<&'static str> {
              also separates touching grains; if it is one grain: largest_piece=True keeps the \
              largest"
         }
+        ShapeError::Quality { cells: Some(cells), .. } => {
+            return Some(format!("cells={cells} resolves it (default: 56)"));
+        }
         ShapeError::InsideOut { .. } => "flip=True inverts its normals",
         ShapeError::TooFewVoxels { .. } => "scan at a higher resolution, or omit the grain",
         ShapeError::Malformed { .. } => {
             "copy or export the file again; if another program opens it, save it uncompressed"
         }
         _ => return None,
-    })
+    };
+    Some(advice.into())
 }
 
 impl IntoException for SetupError {

@@ -44,6 +44,8 @@ impl Default for ShapeOptions {
 
 /// Minimum margin of the grid around the surface, relative to the longest extent.
 const MARGIN: f64 = 0.125;
+/// Relative change of the margin that outweighs rounding errors.
+const ROUNDING: f64 = 1e-9;
 /// Minimum margin of the grid around the surface [cells].
 const MARGIN_CELLS: f64 = 4.0;
 
@@ -60,6 +62,9 @@ pub(crate) struct Body<D> {
     /// Surface area [m^2] if known. Sampling truncates edges, which biases the area more than scan
     /// noise.
     pub area: Option<f64>,
+    /// Vertices of the surface [m] if it is a mesh. Sampling truncates them, which shortens the
+    /// Feret diameters.
+    pub corners: Option<Vec<DVec3>>,
     /// Origin of the surface.
     pub surface: roundness::Surface,
 }
@@ -113,7 +118,12 @@ pub(crate) fn assemble<D: Distance>(
 ) -> Result<Shape> {
     let extent = body.upper - body.lower;
     let spacing = options.spacing(extent)?;
-    let margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
+    let mut margin = (MARGIN * extent.max_element()).max(MARGIN_CELLS * spacing);
+    if !matches!(body.surface, roundness::Surface::Family) {
+        // The rounding error of a whole number of cells, which depends on the unit, must not add a
+        // layer of samples. One grain of the study has that layer and keeps it.
+        margin *= 1.0 - ROUNDING;
+    }
     let sampled = SampledField::sample(&body.distance, body.lower, body.upper, spacing, margin);
     let mut field = sampled.map_err(|error| match error {
         ShapeError::BadParameter { name: SAMPLES, .. } => options.too_thin(extent).unwrap_or(error),
@@ -152,13 +162,16 @@ pub(crate) fn assemble<D: Distance>(
         nodes.iter_mut().for_each(|n| n.area *= share);
     }
     let quality = Quality {
-        gradient_error: quality::gradient_error(&field, &nodes),
+        gradient_error: quality::gradient_error(&field, &mesh),
         volume_error: body.volume.map(|v| mass.volume / v - 1.0),
     };
     options.bounds.check(&quality)?;
 
     let (lower, upper, radius) = bounds(&field, &mesh, &nodes);
     let mut morphology = Morphology::measure(&mesh, upper - lower, mass.volume, area);
+    if let Some(corners) = &body.corners {
+        morphology.set_feret(corners);
+    }
     if options.roundness {
         // Scans have meshes of small faces, on which distance queries are slow.
         let about = |x: DVec3, hint: &mut u32| {

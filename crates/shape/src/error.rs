@@ -117,6 +117,8 @@ pub enum ShapeError {
         defect: Defect,
         /// The bound, and the value that exceeds it.
         reason: String,
+        /// Number of cells across the longest extent that passes, if it was searched and found.
+        cells: Option<usize>,
     },
 }
 
@@ -160,7 +162,7 @@ impl ShapeError {
     }
     pub(crate) fn quality(defect: Defect, reason: impl Into<String>) -> ShapeError {
         let reason = reason.into();
-        ShapeError::Quality { defect, reason }
+        ShapeError::Quality { defect, reason, cells: None }
     }
 }
 

@@ -54,6 +54,12 @@ impl Morphology {
         morphology
     }
 
+    /// Measures the Feret diameters of these points.
+    pub(crate) fn set_feret(&mut self, points: &[DVec3]) {
+        let hull = hull::measure(points).map(|(_, corners)| corners);
+        self.feret = Some(feret::lengths(hull.as_deref().unwrap_or(points)));
+    }
+
     pub(crate) fn new(extents: DVec3, area: f64, volume: f64, convexity: Option<f64>) -> Self {
         let mut sorted = extents.to_array();
         sorted.sort_by(|p, q| q.total_cmp(p));

@@ -2,6 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
+/// Relative difference of second moments that is rounding error.
+const ROUNDING: f64 = 1e-13;
+
 /// Returns eigenvalues (largest first) and unit eigenvectors (columns) of a symmetric matrix, by
 /// Jacobi rotations. For equal eigenvalues the original axes are kept.
 pub(crate) fn symmetric_eigen(matrix: DMat3) -> (DVec3, DMat3) {
@@ -18,8 +21,14 @@ pub(crate) fn symmetric_eigen(matrix: DMat3) -> (DVec3, DMat3) {
             rotate(&mut a, &mut v, p, q);
         }
     }
+    // Equal eigenvalues keep their order, whatever their rounding errors.
+    let equal = ROUNDING * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs());
     let mut order = [0usize, 1, 2];
-    order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if a[order[j]][order[j]] > a[order[i]][order[i]] + equal {
+            order.swap(i, j);
+        }
+    }
     let values = DVec3::from_array(order.map(|i| a[i][i]));
     let axes = order.map(|i| DVec3::from_array(v[i]));
     (values, DMat3::from_cols(axes[0], axes[1], axes[2]))
@@ -27,10 +36,16 @@ pub(crate) fn symmetric_eigen(matrix: DMat3) -> (DVec3, DMat3) {
 
 /// Applies one Jacobi rotation that zeroes entry (p, q); `v` holds the eigenvectors as rows.
 fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
-    if a[p][q] == 0.0 {
+    // The rounding errors of equal moments, which depend on the unit, must not turn the axes.
+    let equal = ROUNDING * (a[p][p].abs() + a[q][q].abs());
+    let mut difference = a[q][q] - a[p][p];
+    if difference.abs() <= equal {
+        difference = 0.0;
+    }
+    if a[p][q] == 0.0 || (difference == 0.0 && a[p][q].abs() <= equal) {
         return;
     }
-    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    let theta = difference / (2.0 * a[p][q]);
     let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     let c = 1.0 / (t * t + 1.0).sqrt();
     let s = t * c;
@@ -91,6 +106,33 @@ mod tests {
             let rebuilt = axes * DMat3::from_diagonal(values) * axes.transpose();
             assert!(rebuilt.abs_diff_eq(matrix, 1e-11));
             assert!((axes.x_axis.dot(r.y_axis).abs() - 1.0).abs() < 1e-11);
+        }
+    }
+
+    /// The corner tetrahedron and a prism on its edge, with the rounding errors of several units.
+    #[test]
+    fn rounding_errors_do_not_turn_equal_axes() {
+        let tetrahedron = |e: [f64; 3]| {
+            DMat3::from_cols(
+                DVec3::new(3.0 + e[0], -1.0, -1.0),
+                DVec3::new(-1.0, 3.0 + e[1], -1.0),
+                DVec3::new(-1.0, -1.0, 3.0 + e[2]),
+            )
+        };
+        let prism = |e: [f64; 3]| {
+            DMat3::from_cols(
+                DVec3::new(2.0 + e[0], e[1], 0.0),
+                DVec3::new(e[1], 2.0 + e[2], 0.5),
+                DVec3::new(0.0, 0.5, 1.0),
+            )
+        };
+        for matrix in [&tetrahedron as &dyn Fn([f64; 3]) -> DMat3, &prism] {
+            let (_, axes) = symmetric_eigen(matrix([0.0; 3]));
+            for n in 1..64 {
+                let error = [n % 4, n / 4 % 4, n / 16].map(|k| 4e-16 * (f64::from(k) - 1.5));
+                let (_, other) = symmetric_eigen(matrix(error));
+                assert!(other.abs_diff_eq(axes, 1e-9), "{error:?}: {other} instead of {axes}");
+            }
         }
     }
 

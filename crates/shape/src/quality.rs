@@ -2,13 +2,13 @@
 
 use crate::error::{Defect, Result, ShapeError};
 use crate::field::SampledField;
-use crate::nodes::SurfaceNode;
+use crate::triangles::TriangleMesh;
 use glam::{DMat3, DVec3};
 
 /// Measured quality of a sampled shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// 0.9 quantile of the deviation of the gradient length from 1 at the surface.
+    /// 0.9 quantile, by area, of the deviation of the gradient length from 1 at the surface.
     pub gradient_error: f64,
     /// Relative difference between the volumes of the field and of its source; `None` if the exact
     /// source volume is unknown.
@@ -51,20 +51,27 @@ impl QualityBounds {
     }
 }
 
-/// Measures the gradient error at the nodes and one cell to either side of the surface.
-pub(crate) fn gradient_error(field: &SampledField, nodes: &[SurfaceNode]) -> f64 {
-    let mut errors: Vec<f64> = nodes
-        .iter()
-        .flat_map(|node| {
-            let normal = field.distance_and_gradient(node.position).1.normalize_or_zero();
+/// Measures the gradient error on the faces of the surface of `field`, and one cell to either side.
+/// Nodes would not do: a rounding error, and thus the unit of length, may move all of them.
+pub(crate) fn gradient_error(field: &SampledField, surface: &TriangleMesh) -> f64 {
+    let mut errors: Vec<(f64, f64)> = (0..surface.triangles.len())
+        .flat_map(|face| {
+            let middle = surface.corners(face).iter().sum::<DVec3>() / 3.0;
+            let normal = field.distance_and_gradient(middle).1.normalize_or_zero();
+            let area = surface.twice_area(face).length();
             [-1.0, 0.0, 1.0].map(|s| {
-                let x: DVec3 = node.position + s * field.spacing() * normal;
-                (field.distance_and_gradient(x).1.length() - 1.0).abs()
+                let x = middle + s * field.spacing() * normal;
+                ((field.distance_and_gradient(x).1.length() - 1.0).abs(), area)
             })
         })
         .collect();
-    errors.sort_by(f64::total_cmp);
-    errors.get(errors.len() * 9 / 10).copied().unwrap_or(f64::NAN)
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut rest = 0.9 * errors.iter().map(|(_, area)| area).sum::<f64>();
+    let quantile = errors.iter().find(|(_, area)| {
+        rest -= area;
+        rest <= 0.0
+    });
+    quantile.map_or(f64::NAN, |(error, _)| *error)
 }
 
 /// Refuses a frame with off-diagonal second moments, hence not the principal frame.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use grainwake_shape::render::{Picture, View};
 use grainwake_shape::scan::{
-    Scan, ScanOptions, ScannedGrain, Threshold, read_volume_and_voxel, scan_volume,
+    Scan, ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
 };
 use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -77,6 +77,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
             masked.value
         );
     }
+    grey_notes(&scan.grains).iter().for_each(|note| tell!("note: {note}"));
     if let Some(picture) = &args.preview {
         preview::draw(picture, args, &volume, &scan)?;
         let lines = treated(&scan.grains).into_iter().chain(lines(&scan.refusals, args.rescue));

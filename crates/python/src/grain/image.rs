@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use grainwake_run::case::quantity::Length;
 use grainwake_shape::ReadLimits;
 use grainwake_shape::scan::{
-    Scan, ScanOptions, Threshold, Voxels, read_volume_and_voxel, scan_volume,
+    Scan, ScanOptions, Threshold, Voxels, grey_notes, read_volume_and_voxel, scan_volume,
 };
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
@@ -130,7 +130,8 @@ impl PyGrain {
     ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
     ///     booleans are labels with 0 for background, floating numbers are grey values.
     /// voxel : float or str
-    ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`.
+    ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, as does
+    ///     a grain with too few voxels free of blur to measure its grey value.
     /// label : int, optional
     ///     Label of a single grain.
     /// threshold : float or {"otsu", "otsu3"}, optional
@@ -235,7 +236,8 @@ impl PyGrain {
 ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
 ///     booleans are labels with 0 for background, floating numbers are grey values.
 /// voxel : float or str
-///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`.
+///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, as do
+///     grains with too few voxels free of blur to measure their grey value.
 /// label : int, optional
 ///     Label of a single grain.
 /// threshold : float or {"otsu", "otsu3"}, optional
@@ -377,7 +379,9 @@ fn read(
             scan_volume(&volume, &source, &how, &quiet)
         })
     };
-    scanned.raise()
+    let scan = scanned.raise()?;
+    warn(py, grey_notes(&scan.grains))?;
+    Ok(scan)
 }
 
 fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {

@@ -23,7 +23,8 @@ pub use image::PyScan;
 /// Grain shape: signed distance, surface nodes, mass properties and morphology.
 ///
 /// A grain has no position and no density; `at` adds both for a case. Its frame has the origin at
-/// the centroid and the principal axes of inertia along x (longest), y and z. Lengths are in m.
+/// the centroid and the principal axes of inertia along x (smallest moment of inertia, mostly the
+/// longest axis), y and z. Lengths are in m.
 ///
 /// Examples
 /// --------

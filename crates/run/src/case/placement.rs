@@ -5,8 +5,8 @@ use glam::{DMat3, DQuat, DVec3};
 use super::raw::{Orientation, Turns};
 use grainwake_solver::dem::{Enclosure, Grain, Side, wall_gap};
 
-/// Returns the orientation of a grain after its turns. The principal frame of a shape has the
-/// longest axis along x and the shortest along z.
+/// Returns the orientation of a grain after its turns. In the principal frame of a shape the moment
+/// of inertia about x is the smallest and the one about z the largest.
 ///
 /// A quaternion of unit length is kept exactly, so that a resolved case gives the same grain.
 pub(super) fn orientation(orientation: &Orientation, turns: &Turns) -> Result<DQuat, String> {

@@ -23,6 +23,7 @@ pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape
         upper: axes,
         volume: Some(4.0 / 3.0 * std::f64::consts::PI * a * b * c),
         area: None,
+        corners: None,
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)

@@ -48,6 +48,7 @@ pub fn rounded_box(
         upper: half,
         volume: Some(volume),
         area: Some(area),
+        corners: None,
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
@@ -76,6 +77,7 @@ pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shap
         upper: extent,
         volume: Some(PI * radius * radius * height),
         area: Some(2.0 * PI * radius * (radius + height)),
+        corners: None,
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)
@@ -100,6 +102,7 @@ pub fn capsule(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape
         upper: extent,
         volume: Some(PI * radius * radius * (height + 4.0 / 3.0 * radius)),
         area: Some(2.0 * PI * radius * (height + 2.0 * radius)),
+        corners: None,
         surface: Surface::Exact,
     };
     assemble(&body, provenance, options)

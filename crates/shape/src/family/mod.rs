@@ -94,6 +94,7 @@ pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) ->
             upper: stone.upper * size,
             volume: Some(stone.volume * size.powi(3)),
             area: None,
+            corners: None,
             surface: Surface::Family,
         };
         let provenance = Provenance::new("family")

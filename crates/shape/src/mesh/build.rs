@@ -1,7 +1,7 @@
 //! Construction of a shape from a closed mesh.
 
 use super::{MeshDistance, TriangleMesh};
-use crate::assemble::{Body, ShapeOptions, assemble};
+use crate::assemble::{Body, DEFAULT_CELLS, ShapeOptions, assemble};
 use crate::error::{Result, ShapeError};
 use crate::limits::SourceFile;
 use crate::provenance::Provenance;
@@ -41,7 +41,26 @@ pub fn shape_from_mesh(
         Err(error) => return Err(error.in_file(&source.name)),
     };
     closed.check_crossings().map_err(|error| error.in_file(&source.name))?;
-    from_closed(closed, Surface::Exact, provenance, &options.shape)
+    let built = from_closed(closed, Surface::Exact, provenance.clone(), &options.shape);
+    built.map_err(|error| with_enough_cells(error, closed, &options.shape))
+}
+
+/// Numbers of cells that are tried on a mesh that a given number resolves too poorly, relative to
+/// that number.
+const MORE: [f64; 4] = [1.25, 1.5, 2.0, 3.0];
+
+/// Completes the error of a mesh that fails the quality check by the number of cells that passes.
+fn with_enough_cells(error: ShapeError, mesh: &TriangleMesh, given: &ShapeOptions) -> ShapeError {
+    let ShapeError::Quality { defect, reason, .. } = error else {
+        return error;
+    };
+    let present = given.cells.unwrap_or(DEFAULT_CELLS) as f64;
+    let passes = |cells: &usize| {
+        let more = ShapeOptions { cells: Some(*cells), roundness: false, ..given.clone() };
+        from_closed(mesh, Surface::Exact, Provenance::new("mesh"), &more).is_ok()
+    };
+    let cells = MORE.map(|share| (share * present).ceil() as usize).into_iter().find(passes);
+    ShapeError::Quality { defect, reason, cells }
 }
 
 /// Builds the shape of a mesh; determines its frame and bounds and completes `provenance`.
@@ -58,6 +77,7 @@ pub(crate) fn from_closed(
     let local = mesh.in_frame(mass.centroid, axes);
     let (lower, upper) = local.bounds();
     let distance = MeshDistance::new(&local)?;
+    let scanned = matches!(surface, Surface::Scanned { .. });
     if let Surface::Scanned { cuts, .. } = &mut surface {
         let to_frame = axes.transpose();
         for place in cuts {
@@ -72,6 +92,7 @@ pub(crate) fn from_closed(
         upper,
         volume: Some(mass.volume),
         area: Some(mesh.area()),
+        corners: (!scanned).then_some(local.vertices),
         surface,
     };
     assemble(&body, provenance, options)

@@ -96,6 +96,9 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     let (field, volume, image) = match &segments.grey {
         Some(grey) => {
             let cut = grey.cut(&mask, &solid, low, label, smoothing);
+            for (assumed, grey) in cut.assumed {
+                provenance = provenance.with(assumed.parameter(), format!("{grey:.6}"));
+            }
             provenance =
                 provenance.with("surface", "grey").with("blur_voxels", format!("{:.3}", cut.blur));
             (cut.field, cut.volume, cut.kernel)

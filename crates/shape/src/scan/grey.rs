@@ -7,11 +7,13 @@
 //! smoothing kernel therefore has the negative second moment of the blur. The remaining bias is
 //! removed by setting the level to match the volume.
 
-use super::Mask;
-use super::transform;
+use super::assumed::Assumed;
+use super::phases::{Phase, phases};
+use super::surroundings::Surroundings;
 use super::watershed::HALO;
+use super::{Mask, transform};
 use crate::filter::{Kernel, gaussian};
-use rayon::prelude::*;
+use crate::grid;
 use std::f64::consts::SQRT_2;
 
 /// Grey values with the owner of each voxel: the label of its grain, combined with [`HALO`] in the
@@ -20,29 +22,32 @@ pub(crate) struct Grey {
     pub dims: [usize; 3],
     pub values: Vec<f32>,
     pub owner: Vec<u32>,
-    /// Mean grey values of void and of solid, far from surfaces.
+    /// Grey value outside the field of view.
+    pub outside: Option<f32>,
+    /// Mean grey value of the void.
     pub void: f64,
-    pub solid: f64,
+    solid: Phase,
 }
 
 /// Distance from the surface beyond which a voxel is entirely solid or void [voxels].
-const BAND: f32 = 2.7;
-/// Preferred additional distance from the band at which the grey of a grain is sampled [voxels].
-const DEEPER: f32 = 0.5;
-/// Largest blur that is assumed to darken grains without deep voxels [voxels].
+pub(super) const BAND: f32 = 2.7;
+/// Preferred additional distance from the band at which the grey values of a grain and of the void
+/// around it are sampled [voxels].
+pub(super) const DEEPER: f32 = 0.5;
+/// Depth of the core of a grain without deep voxels, relative to its largest depth: preferred and
+/// minimum.
+const CORE: [f32; 2] = [0.8, 0.5];
+/// Smallest and largest blur that is assumed to darken such a core [voxels].
+const SHARP: f64 = 0.2;
 const STRONG_BLUR: f64 = 1.25;
+/// Iterations for the grey of such a grain; each halves the error or more.
+const ITERATIONS: usize = 8;
 /// Layers of void that are assigned to a grain [voxels].
 pub(crate) const LAYERS: usize = 4;
-
-/// Number of voxels sufficient for the mean grey values of an image.
-const ENOUGH: usize = 1 << 24;
-/// Minimum number of deep voxels for the mean grey of a phase.
-const FEW_DEEP: u64 = 200;
-/// Minimum number of deep voxels for the grey of a single grain, and of less deep voxels for that
-/// of a phase; they are preferable to all voxels, which the blur of the surface darkens.
-const SOME_DEEP: u64 = 24;
-/// Steps along the axes without a voxel of the other phase that make a voxel deep.
-const CLEAR: usize = 4;
+/// Depth at which blur hardly darkens a grain [standard deviations].
+const CLEAR_OF_BLUR: f64 = 2.5;
+/// Minimum number of deep voxels for the grey of a grain and of the void around it.
+pub(super) const SOME_DEEP: usize = 24;
 
 /// The solid fractions of one grain in a crop of the image, with the surface at zero.
 pub(crate) struct Cut {
@@ -54,27 +59,21 @@ pub(crate) struct Cut {
     pub blur: f64,
     /// Combined kernel of blur and smoothing [voxels].
     pub kernel: Kernel,
+    /// Grey values that were not measured on the grain.
+    pub assumed: Vec<(Assumed, f64)>,
 }
 
 impl Grey {
-    /// Computes the mean grey values of the phases from voxels without the other phase within
-    /// `reach` along the axes, or from the deepest voxels if there are hardly any. Voxels with the
-    /// value `outside` lie outside the field of view.
+    /// Computes the mean grey values of the phases. Voxels with the value `outside` lie outside the
+    /// field of view.
     pub(crate) fn new(
         dims: [usize; 3],
         values: Vec<f32>,
         owner: Vec<u32>,
         outside: Option<f32>,
     ) -> Grey {
-        let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
-        // For large images a fraction of the rows suffices, unless few voxels are deep.
-        let share = (values.len() / ENOUGH).max(1);
-        let mut grey = mean_grey(dims, &values, outside, is_solid, share);
-        if share > 1 && grey.iter().any(|(_, deep)| *deep < FEW_DEEP) {
-            grey = mean_grey(dims, &values, outside, is_solid, 1);
-        }
-        let [(void, _), (solid, _)] = grey;
-        Grey { dims, values, owner, void, solid }
+        let [void, solid] = phases(dims, &values, &owner, outside);
+        Grey { dims, values, owner, outside, void: void.grey, solid }
     }
 
     /// Returns the grain `label`. `mask` contains its solid voxels with cavities filled, `solid`
@@ -92,37 +91,46 @@ impl Grey {
         let porous = (solid.solid != mask.solid).then(|| transform::signed(solid));
         // Distance from the surface or from the nearest cavity.
         let depth = porous.as_ref().unwrap_or(&distance);
-        let place = |n: usize| -> Option<usize> {
-            let at = crate::grid::place(dims, n);
-            let mut index = 0;
-            for axis in (0..3).rev() {
-                let i = usize::try_from(low[axis] + at[axis] as isize).ok()?;
-                if i >= self.dims[axis] {
-                    return None;
-                }
-                index = index * self.dims[axis] + i;
-            }
-            Some(index)
+        let crop = Crop { image: self, dims, low };
+        let mut assumed = Vec::new();
+        let void = Surroundings::measure(&crop, mask, &distance, self.void);
+        let void = void.unwrap_or_else(|| {
+            assumed.push((Assumed::Void, self.void));
+            Surroundings::uniform(self.void)
+        });
+        // Grey above the void of the voxels that the surface may cut.
+        let near = |n: usize| {
+            let m = crop.place(n).filter(|_| distance[n] <= BAND)?;
+            (self.owner[m] & !HALO == label).then(|| f64::from(self.values[m]) - void.at(n))
         };
-        let own = self.own_grey(solid, depth, &place);
+        // Voxels just beyond the band are slightly darkened. They are better than an estimate from
+        // the grey of other grains, which may differ, but not than one from the grain alone.
+        let limits = [Some(BAND + DEEPER), self.solid.deep.then_some(BAND)];
+        let deep = limits.into_iter().flatten().find_map(|limit| crop.deep_grey(depth, limit));
+        let own = deep.map(|grey| grey - void.mean).unwrap_or_else(|| {
+            let above: Vec<f32> =
+                (0..distance.len()).map(|n| near(n).unwrap_or(0.0) as f32).collect();
+            let usual = self.solid.deep.then(|| self.solid.grey - void.mean);
+            estimated_grey(&above, dims, depth, usual)
+        });
         let share = |n: usize| -> f64 {
             // A cavity belongs to the grain for any grey value, as does its wall, which its blur
             // darkens. Halfway through a wall to the outside the two blurs compensate.
             if distance[n] < -BAND || depth[n] > distance[n] {
                 return 1.0;
             }
-            match place(n) {
-                Some(m) if distance[n] <= BAND && self.owner[m] & !HALO == label => {
-                    (f64::from(self.values[m]) - self.void) / (own - self.void)
-                }
-                _ => 0.0,
-            }
+            let above_void = |above: f64| above / (own + void.mean - void.at(n));
+            near(n).map_or(0.0, above_void)
         };
         let shares: Vec<f32> = (0..distance.len()).map(|n| share(n) as f32).collect();
         let volume = shares.iter().map(|s| f64::from(*s)).sum();
         let once = gaussian(&shares, dims, sigma);
         let steep = steepness(&once, dims);
         let blur = blur(steep, sigma);
+        let free = f64::from(-BAND).min(-CLEAR_OF_BLUR * blur);
+        if depth.iter().filter(|d| f64::from(**d) < free).count() < SOME_DEEP {
+            assumed.push((Assumed::Solid, own + void.mean));
+        }
         // Second moment of a G + (1 - a) G G: s^2 (2 - a) = -blur^2.
         let a = (2.0 + (blur / sigma).powi(2)) as f32;
         let twice = gaussian(&once, dims, sigma);
@@ -137,95 +145,83 @@ impl Grey {
                 (f64::from(a), blur.hypot(sigma)),
                 (f64::from(1.0 - a), blur.hypot(SQRT_2 * sigma)),
             ],
+            assumed,
         }
-    }
-
-    /// Returns the mean grey of the grain's own deep voxels, since grains differ. If there are few,
-    /// its core is a lower bound, and the core divided by its solid fraction under a strong blur an
-    /// upper bound; the mean grey of all grains is moved into these bounds.
-    fn own_grey(
-        &self,
-        solid: &Mask,
-        depth: &[f32],
-        place: &impl Fn(usize) -> Option<usize>,
-    ) -> f64 {
-        let beyond = |limit: f32| -> Vec<(usize, f64)> {
-            let deep = (0..depth.len()).filter(|n| depth[*n] < limit);
-            deep.filter_map(|n| Some((n, f64::from(self.values[place(n)?])))).collect()
-        };
-        let mean = |deep: &[(usize, f64)]| {
-            deep.iter().map(|(_, grey)| grey).sum::<f64>() / deep.len() as f64
-        };
-        let mut deep = [-BAND - DEEPER, -BAND].into_iter().map(beyond);
-        if let Some(deep) = deep.find(|deep| deep.len() as u64 >= SOME_DEEP) {
-            return mean(&deep);
-        }
-        let core = beyond(0.5 * depth.iter().fold(0.0, |least: f32, d| least.min(*d)));
-        let mask: Vec<f32> = solid.solid.iter().map(|s| f32::from(u8::from(*s))).collect();
-        let blurred = gaussian(&mask, solid.dims, STRONG_BLUR);
-        let fraction =
-            core.iter().map(|(n, _)| f64::from(blurred[*n])).sum::<f64>() / core.len() as f64;
-        let least = mean(&core) - self.void;
-        self.void + (self.solid - self.void).min(least / fraction).max(least)
     }
 }
 
-/// Returns the number of steps along the axes, in all directions, without a voxel of the kind
-/// `other`; at most [`CLEAR`].
-fn clear(dims: [usize; 3], n: usize, other: impl Fn(usize) -> bool) -> usize {
-    let strides = [1, dims[0], dims[0] * dims[1]];
-    let blocked = (1..=CLEAR).find(|s| {
-        (0..3).any(|axis| {
-            let i = n / strides[axis] % dims[axis];
-            let below = *s <= i && other(n - s * strides[axis]);
-            below || (i + s < dims[axis] && other(n + s * strides[axis]))
+/// Part of an image around a grain.
+pub(super) struct Crop<'a> {
+    image: &'a Grey,
+    dims: [usize; 3],
+    /// Image coordinate of the first voxel, which may lie outside.
+    low: [isize; 3],
+}
+
+impl Crop<'_> {
+    /// Returns the index in the image of voxel `n` of the crop.
+    fn place(&self, n: usize) -> Option<usize> {
+        let (at, dims) = (grid::place(self.dims, n), self.image.dims);
+        let mut index = 0;
+        for axis in (0..3).rev() {
+            let i = usize::try_from(self.low[axis] + at[axis] as isize).ok()?;
+            if i >= dims[axis] {
+                return None;
+            }
+            index = index * dims[axis] + i;
+        }
+        Some(index)
+    }
+
+    /// Returns the grey value of voxel `n` if it lies inside the field of view.
+    pub(super) fn grey(&self, n: usize) -> Option<f32> {
+        let value = self.image.values[self.place(n)?];
+        (Some(value) != self.image.outside).then_some(value)
+    }
+
+    /// Returns whether voxel `n` belongs to a grain.
+    pub(super) fn is_solid(&self, n: usize) -> bool {
+        let owner = self.place(n).map_or(0, |m| self.image.owner[m]);
+        owner != 0 && owner & HALO == 0
+    }
+
+    /// Returns the mean grey of the voxels farther than `limit` from the surface and from cavities;
+    /// `None` if there are too few.
+    fn deep_grey(&self, depth: &[f32], limit: f32) -> Option<f64> {
+        let deep = (0..depth.len()).filter(|n| depth[*n] < -limit);
+        let deep: Vec<f64> =
+            deep.filter_map(|n| Some(f64::from(self.image.values[self.place(n)?]))).collect();
+        (deep.len() >= SOME_DEEP).then(|| deep.iter().sum::<f64>() / deep.len() as f64)
+    }
+}
+
+/// Returns the grey above the void of a grain without deep voxels from its core, which blur
+/// darkens. The core is a lower bound, and the core over its solid fraction under a strong blur an
+/// upper bound. The `usual` grey of the grains is moved into these bounds. If it is unknown, the
+/// blur is that of the edges of the grain.
+fn estimated_grey(above: &[f32], dims: [usize; 3], depth: &[f32], usual: Option<f64>) -> f64 {
+    let deepest = depth.iter().fold(0.0, |least: f32, d| least.min(*d));
+    let beyond = |share: f32| -> Vec<usize> {
+        (0..depth.len()).filter(|n| depth[*n] < share * deepest).collect()
+    };
+    let core = Some(beyond(CORE[0])).filter(|core| core.len() >= SOME_DEEP);
+    let core = core.unwrap_or_else(|| beyond(CORE[1]));
+    let mean =
+        |field: &[f32]| core.iter().map(|n| f64::from(field[*n])).sum::<f64>() / core.len() as f64;
+    let least = mean(above);
+    // The threshold of the image need not be half way to the grey of this grain.
+    let half = |v: &f32| f32::from(u8::from(*v > 0.5 * least as f32));
+    let mask: Vec<f32> = above.iter().map(half).collect();
+    let fraction = |blur: f64| mean(&gaussian(&mask, dims, blur.max(SHARP)));
+    let most = least / fraction(STRONG_BLUR);
+    let usual = usual.unwrap_or_else(|| {
+        // The blur in voxels depends on the grey that is sought.
+        (0..ITERATIONS).fold(least, |grey, _| {
+            let shares: Vec<f32> = above.iter().map(|v| v / grey as f32).collect();
+            least / fraction(blur(steepness(&shares, dims), SHARP).min(STRONG_BLUR))
         })
     });
-    blocked.map_or(CLEAR, |s| s - 1)
-}
-
-/// Returns the mean grey values of void and of solid, each with its number of sampled deep voxels,
-/// from those or from the deepest class with enough voxels. One in `share` rows is sampled.
-fn mean_grey(
-    dims: [usize; 3],
-    values: &[f32],
-    outside: Option<f32>,
-    is_solid: impl Fn(usize) -> bool + Sync,
-    share: usize,
-) -> [(f64, u64); 2] {
-    let row = |j: usize, k: usize| {
-        let start = dims[0] * (j + dims[1] * k);
-        start..start + dims[0]
-    };
-    // Sum and number of the voxels of both phases by clear steps, for each slice.
-    let slices: Vec<[[(f64, u64); CLEAR + 1]; 2]> = (0..dims[2])
-        .into_par_iter()
-        .map(|k| {
-            let mut sums = [[(0.0, 0); CLEAR + 1]; 2];
-            let rows = (0..dims[1]).filter(|j| (j + k) % share == 0);
-            for n in rows.flat_map(|j| row(j, k)).filter(|n| Some(values[*n]) != outside) {
-                let phase = is_solid(n);
-                let sum = &mut sums[usize::from(phase)][clear(dims, n, |m| is_solid(m) != phase)];
-                *sum = (sum.0 + f64::from(values[n]), sum.1 + 1);
-            }
-            sums
-        })
-        .collect();
-    [0, 1].map(|phase| {
-        let total = |steps: usize| {
-            let sums = slices.iter().flat_map(|s| &s[phase][steps..]);
-            sums.fold((0.0, 0), |t, s| (t.0 + s.0, t.1 + s.1))
-        };
-        let deep = total(CLEAR);
-        let some = |sum: &(f64, u64)| sum.1 >= SOME_DEEP;
-        let (sum, count) = if deep.1 >= FEW_DEEP {
-            deep
-        } else {
-            let shallower = [CLEAR - 1, CLEAR - 2].map(total);
-            shallower.into_iter().find(some).unwrap_or_else(|| total(0))
-        };
-        (sum / count.max(1) as f64, deep.1)
-    })
+    usual.min(most).max(least)
 }
 
 /// Returns the median gradient length by central differences [1/voxel] near the crossing of a
@@ -276,33 +272,4 @@ fn blur(steepness: f64, sigma: f64) -> f64 {
         }
     }
     (low * low - sigma * sigma).max(0.0).sqrt().min(2.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_share_of_the_rows_gives_the_grey_of_all() {
-        let dims = [40, 40, 40];
-        let inside = |n: usize| {
-            let at = [n % 40, n / 40 % 40, n / 1600];
-            at.iter().all(|i| (8..32).contains(i))
-        };
-        // Solid 3, void 1, with a ripple, and a darker rim of the solid.
-        let value = |n: usize| {
-            let at = [n % 40, n / 40 % 40, n / 1600];
-            let rim = inside(n) && at.iter().any(|i| *i == 8 || *i == 31);
-            1.0 + 2.0 * f32::from(u8::from(inside(n))) - f32::from(u8::from(rim))
-                + 0.1 * (n as f32 * 0.7).sin()
-        };
-        let values: Vec<f32> = (0..64_000).map(value).collect();
-        for share in [1, 4] {
-            let [void, solid] = mean_grey(dims, &values, None, inside, share);
-            assert!((void.0 - 1.0).abs() < 0.01, "{}", void.0);
-            assert!((solid.0 - 3.0).abs() < 0.01, "deep voxels alone: {}", solid.0);
-            // 16^3 voxels are deep.
-            assert_eq!(solid.1 as usize, 4096 / share);
-        }
-    }
 }

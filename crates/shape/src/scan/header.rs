@@ -133,17 +133,17 @@ pub(super) fn voxels(
             return Err(unsupported(reason.into()));
         }
     };
-    // Surplus data indicates slices that would be lost without notice.
+    let dims = [nx, ny, nz].map(|n| n as usize);
     if unpacked.len() as u64 > needed {
         let place = data_file.map_or("the file".to_owned(), |name| format!("{name:?}"));
         let has = if raw { unpacked.len().to_string() } else { "more".to_owned() };
+        let has = format!("{place} has {has} after a byte skip of {skip}");
         return Err(unsupported(format!(
-            "the header states {nx} x {ny} x {nz} voxels of {width} bytes, {needed} bytes; {place} \
-             has {has} after a byte skip of {skip}; correct the sizes (DimSize), or the byte skip \
-             (HeaderSize), which is -1 where the voxels end the file"
+            "{}; correct the sizes (DimSize), or the byte skip (HeaderSize), which is -1 where the \
+             voxels end the file",
+            number.surplus(dims, &has)
         )));
     }
-    let dims = [nx, ny, nz].map(|n| n as usize);
     let mut volume = number.volume(path, dims, false, unpacked)?;
     if header.geometry.is_some_and(|geometry| geometry.mirrored()) {
         mirror(&mut volume);

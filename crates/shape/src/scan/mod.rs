@@ -14,6 +14,7 @@
 //! centred on a voxel is a special case: entire shells of voxels enter at once, and its mask may
 //! differ from the sphere by 3 % of volume, which cannot be recovered from the mask.
 
+mod assumed;
 mod build;
 mod cure;
 mod description;
@@ -28,18 +29,21 @@ mod npy;
 mod npz;
 mod nrrd;
 mod options;
+mod phases;
 mod read;
 mod refusals;
 mod regions;
 mod segments;
 mod slices;
 mod smooth;
+mod surroundings;
 mod threshold;
 mod tiff;
 mod transform;
 mod volume;
 mod watershed;
 
+pub use assumed::{Assumed, grey_notes};
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
 pub use cure::Cure;
 pub use geometry::StatedVoxel;

@@ -16,7 +16,7 @@ const LONGEST_HEADER: usize = 1 << 16;
 pub(super) const HEAD: u64 = LONGEST_HEADER as u64 + 12;
 
 pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Volume> {
-    header(path, bytes, limits)?.volume(path, bytes)
+    header(path, bytes, limits)?.volume(path, bytes, true)
 }
 
 /// Content of a header.
@@ -35,9 +35,16 @@ impl Array {
         self.start as u64 + values * self.number.width as u64
     }
 
-    /// Decodes the volume from the whole file.
-    pub(super) fn volume(&self, path: &Path, bytes: &[u8]) -> Result<Volume> {
+    /// Decodes the volume from the bytes of the file, which may end one byte after the values if
+    /// they are not the `whole` file. Refuses surplus data.
+    pub(super) fn volume(&self, path: &Path, bytes: &[u8], whole: bool) -> Result<Volume> {
         let data = bytes.get(self.start..).unwrap_or(&[]);
+        if bytes.len() as u64 > self.bytes() {
+            let has = if whole { data.len().to_string() } else { "more".to_owned() };
+            let has = format!("the file has {has} after the header");
+            let reason = self.number.surplus(self.dims, &has);
+            return Err(ShapeError::unsupported(path, format!("{reason}; save one array alone")));
+        }
         self.number.volume(path, self.dims, self.fortran, data)
     }
 }
@@ -74,13 +81,23 @@ pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<A
     count(path, [nx, ny, nz], limits)?;
     let dims = [nx as usize, ny as usize, nz as usize];
     let number = Number::parse(&header.descr).ok_or_else(|| {
-        let (descr, remedy) = (&header.descr, "save integers or floating-point numbers");
-        ShapeError::unsupported(path, format!("values of type {descr:?}; {remedy}"))
+        let (descr, remedy) = (&header.descr, "save numbers of one of these types");
+        ShapeError::unsupported(path, format!("values of type {descr:?}; {remedy}: {TYPES}"))
     })?;
     Ok(Array { number, dims, fortran: header.fortran, start: start + length })
 }
 
 impl Number {
+    /// Describes the data that a header states, and what the file `has` instead: surplus data
+    /// indicates slices that would be lost without notice.
+    pub(super) fn surplus(&self, [nx, ny, nz]: [usize; 3], has: &str) -> String {
+        let width = self.width;
+        let needed = (nx * ny * nz) as u64 * width as u64;
+        format!(
+            "the header states {nx} x {ny} x {nz} voxels of {width} bytes, {needed} bytes; {has}"
+        )
+    }
+
     /// Decodes voxels in `data`, x fastest, or z fastest in Fortran order.
     pub(super) fn volume(
         &self,
@@ -96,7 +113,6 @@ impl Number {
             let reason = format!("the header claims {needed} bytes of data, the file has {has}");
             return Err(ShapeError::malformed(path, reason));
         }
-        let data = &data[..needed as usize];
         // Index of voxel n (x fastest) in the file.
         let index = |n: usize| {
             let [i, j, k] = place(dims, n);
@@ -146,6 +162,10 @@ impl Header {
     }
 }
 
+/// Types that are read, for messages.
+pub(super) const TYPES: &str =
+    "booleans, integers of 8 to 64 bits, floating-point numbers of 16, 32 or 64 bits";
+
 /// A numeric type: byte order, kind (b, i, u, f) and width in bytes.
 pub(super) struct Number {
     pub big: bool,
@@ -168,7 +188,7 @@ impl Number {
             width: usize::from(width.wrapping_sub(b'0')),
         };
         match (kind, number.width) {
-            (b'b', 1) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'f', 4 | 8) => Some(number),
+            (b'b', 1) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'f', 2 | 4 | 8) => Some(number),
             _ => None,
         }
     }
@@ -181,6 +201,7 @@ impl Number {
         }
         let bits = u64::from_le_bytes(raw);
         match (self.kind, self.width) {
+            (b'f', 2) => half(bits as u16),
             (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
             (b'f', _) => f64::from_bits(bits),
             (b'i', width) => {
@@ -189,6 +210,18 @@ impl Number {
             }
             _ => bits as f64,
         }
+    }
+}
+
+/// Decodes a number of half precision: sign, 5 bits of the exponent, 10 bits of the fraction.
+fn half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 0 { 1.0 } else { -1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
+    sign * match exponent {
+        0 => fraction * 2f64.powi(-14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction) * 2f64.powi(exponent - 15),
     }
 }
 
@@ -225,9 +258,34 @@ mod tests {
         let grey: Vec<u8> = (0..6).flat_map(|v| (f64::from(v) - 0.5).to_le_bytes()).collect();
         let read = open(&file(&header("<f8", "False"), &grey)).unwrap();
         assert_eq!(read.voxels, Voxels::Grey(vec![-0.5, 0.5, 1.5, 2.5, 3.5, 4.5]));
+        // Half precision: 0, 1, -2, 65504, the smallest number, 1/3.
+        let half = [0u16, 0x3c00, 0xc000, 0x7bff, 1, 0x3555];
+        let half: Vec<u8> = half.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let read = open(&file(&header("<f2", "False"), &half)).unwrap();
+        let expect = vec![0.0, 1.0, -2.0, 65504.0, 2f32.powi(-24), 0.333_251_95];
+        assert_eq!(read.voxels, Voxels::Grey(expect));
+        let other = open(&file(&header("<c8", "False"), &[0; 48])).unwrap_err().to_string();
+        for word in ["\"<c8\"", "integers of 8 to 64 bits", "numbers of 16, 32 or 64 bits"] {
+            assert!(other.contains(word), "`{word}` is missing in: {other}");
+        }
         let negative: Vec<u8> = (-3..3i16).flat_map(i16::to_le_bytes).collect();
         let read = open(&file(&header("<i2", "False"), &negative)).unwrap();
         assert_eq!(read.voxels, Voxels::Grey(vec![-3.0, -2.0, -1.0, 0.0, 1.0, 2.0]));
+    }
+
+    #[test]
+    fn surplus_data_are_refused() {
+        let header = "{'descr': '<u2', 'fortran_order': False, 'shape': (1, 2, 3), }";
+        assert!(open(&file(header, &[7; 12])).is_ok());
+        // A second array in the file, as two calls of numpy.save leave it.
+        for surplus in [1, 90] {
+            let error = open(&file(header, &[7; 102][..12 + surplus])).unwrap_err().to_string();
+            let words = format!(
+                "the header states 3 x 2 x 1 voxels of 2 bytes, 12 bytes; the file has {} after",
+                12 + surplus
+            );
+            assert!(error.contains(&words), "{error}");
+        }
     }
 
     #[test]

@@ -30,10 +30,11 @@ pub(super) fn read(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<Vol
         let limit = limits.file_bytes;
         return Err(ShapeError::too_large(path, &claimed, limit, "bytes"));
     }
-    // One additional byte: the archive's checksum is compared at the end of the data.
+    // One additional byte: it reveals surplus data, and at the end of the data the archive's
+    // checksum is compared.
     let rest = (array.bytes() + 1).saturating_sub(plain.len() as u64);
     file.take(rest).read_to_end(&mut plain).map_err(unreadable)?;
-    array.volume(path, &plain)
+    array.volume(path, &plain, false)
 }
 
 #[cfg(test)]
@@ -90,8 +91,10 @@ mod tests {
             let error = read(Path::new("a.npz"), &file, &limits).unwrap_err();
             assert!(error.to_string().contains(stated), "{error}");
         }
-        // At most one byte after the array is decompressed.
+        // Surplus data are refused; at most one byte after the array is decompressed.
         let file = packed(&["a.npy"], "(1, 2, 3)", &data);
-        assert_eq!(read(Path::new("a.npz"), &file, &limits).unwrap().dims, [3, 2, 1]);
+        let error = read(Path::new("a.npz"), &file, &limits).unwrap_err().to_string();
+        let words = "the header states 3 x 2 x 1 voxels of 1 bytes, 6 bytes; the file has more";
+        assert!(error.contains(words), "{error}");
     }
 }

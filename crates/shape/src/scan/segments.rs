@@ -95,14 +95,22 @@ pub(super) fn segment(
         threshold: Some(cut),
         masked: view.map(|view| Masked { value: view.outside, share: view.share }),
     };
-    // A binary image has no intermediate grey values.
-    let two = values.iter().all(|v| *v == values[0] || *v == 0.0 || *v == 1.0 || *v == 255.0);
-    if options.sub_voxel && !two && segments.labels.iter().all(|l| *l < HALO) {
+    if options.sub_voxel && !is_mask(&values, outside) && segments.labels.iter().all(|l| *l < HALO)
+    {
         let mut owner = segments.labels.clone();
         add_halo(&mut owner, dims, LAYERS);
         segments.grey = Some(Grey::new(dims, values, owner, outside));
     }
     Ok(segments)
+}
+
+/// Returns whether an image has at most two values inside the field of view, and therefore no
+/// intermediate grey values.
+fn is_mask(values: &[f32], outside: Option<f32>) -> bool {
+    let mut inside = values.iter().filter(|v| Some(**v) != outside);
+    let first = inside.next();
+    let second = inside.clone().find(|v| Some(*v) != first);
+    inside.all(|v| Some(v) == first || Some(v) == second)
 }
 
 /// Fills cavities, splits and separates according to the options.

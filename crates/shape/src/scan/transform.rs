@@ -24,6 +24,12 @@ pub(crate) fn to_void(mask: &Mask) -> Vec<f32> {
     squared(mask, false)
 }
 
+/// Returns the squared distance [voxels^2] of every voxel centre to the nearest solid voxel; 0 in
+/// the solid.
+pub(crate) fn to_solid(mask: &Mask) -> Vec<f32> {
+    squared(mask, true)
+}
+
 /// Returns the squared distance of every voxel to the nearest voxel with mask value `target`.
 fn squared(mask: &Mask, target: bool) -> Vec<f32> {
     let [nx, ny, nz] = mask.dims;

@@ -11,6 +11,7 @@ mod render;
 mod rescue;
 mod roundness;
 mod scan;
+mod surroundings;
 mod tiled;
 mod tiles;
 mod touching;

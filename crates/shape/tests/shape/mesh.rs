@@ -1,11 +1,13 @@
 //! Shapes from mesh files: formats, accuracy and located errors.
 
 use crate::common::{close, shared};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use grainwake_shape::mesh::{
     MeshOptions, TriangleMesh, mesh_from_memory, read_mesh, shape_from_mesh,
 };
-use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile, analytic};
+use grainwake_shape::{
+    QualityBounds, ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile, analytic,
+};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;
 use std::f64::consts::PI;
@@ -703,5 +705,91 @@ fn a_regular_tetrahedron_is_accepted_for_any_position_of_its_tips() {
         let shape = shape_from_mesh(&mesh, &SourceFile::default(), &options).unwrap();
         println!("{cells}: {:+.5}", shape.volume() / (8.0 / 3.0) - 1.0);
         close(shape.volume(), 8.0 / 3.0, 0.01);
+    }
+}
+
+/// The tetrahedron between the origin and one unit along each axis. Two of its principal moments are
+/// equal.
+fn corner(unit: f64) -> TriangleMesh {
+    let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|v| unit * v).to_vec();
+    TriangleMesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] }
+}
+
+#[test]
+fn the_quality_does_not_depend_on_the_unit() {
+    let bounds = QualityBounds { gradient_error: 1.0, volume_error: 1.0 };
+    for cells in [40, 56, 100] {
+        let built = |unit: f64| {
+            let nodes = Some(200);
+            let shape = ShapeOptions { cells: Some(cells), nodes, bounds, ..options().shape };
+            let options = MeshOptions { shape, flip: false };
+            shape_from_mesh(&corner(unit), &SourceFile::default(), &options).unwrap()
+        };
+        let one = built(1.0);
+        for unit in [1e-3, 1e-6, 0.3, 25.4e-3, 17.0] {
+            let other = built(unit);
+            let turn = one.provenance().rotation.dot(other.provenance().rotation);
+            assert!(turn.abs() > 1.0 - 1e-9, "{unit}: {turn}");
+            let [a, b] = [&one, &other].map(|shape| shape.quality().unwrap().gradient_error);
+            println!("{cells} cells, {unit}: {a:.5} and {b:.5}");
+            close(b, a, 0.01);
+            close(other.volume(), unit.powi(3) * one.volume(), 1e-4);
+        }
+    }
+}
+
+/// Cells and margins add up to 50, 42 and 34 cells, which rounding makes 51 or 43 in some units.
+#[test]
+fn the_grid_does_not_depend_on_the_unit() {
+    let error = |unit: f64| {
+        let [a, b, c] = [1.0, 0.8, 0.6].map(|axis| 0.5 * unit * axis);
+        let (cells, nodes) = (Some(40), Some(200));
+        let options = ShapeOptions { cells, nodes, roundness: false, ..Default::default() };
+        let shape = analytic::ellipsoid(a, b, c, &options).unwrap();
+        [shape.quality().unwrap().gradient_error, shape.volume() / unit.powi(3)]
+    };
+    let [gradient, volume] = error(1.0);
+    for unit in [1e-3, 25.4e-3, 0.7e-3, 0.7, 3.0] {
+        let [other, scaled] = error(unit);
+        println!("{unit}: {other} {gradient}, {}", scaled / volume - 1.0);
+        close(other, gradient, 0.01);
+    }
+}
+
+#[test]
+fn a_mesh_that_is_resolved_too_poorly_is_refused_with_a_number_of_cells_that_is_enough() {
+    let built = |unit: f64, cells: Option<usize>| {
+        let shape = ShapeOptions { cells, roundness: false, ..Default::default() };
+        let options = MeshOptions { shape, flip: false };
+        shape_from_mesh(&corner(unit), &SourceFile::default(), &options)
+    };
+    for unit in [1.0, 1e-3, 1e-6] {
+        let Err(ShapeError::Quality { cells, .. }) = built(unit, Some(32)) else {
+            panic!("32 cells pass");
+        };
+        println!("{unit}: {cells:?}");
+        assert!(cells.is_some_and(|cells| built(unit, Some(cells)).is_ok()));
+    }
+}
+
+/// The longest Feret diameter of a cube is its diagonal, which sampling would truncate.
+#[test]
+fn feret_diameters_of_a_mesh_are_those_of_its_vertices() {
+    let cube = |turn: DQuat| {
+        let corner = |n: usize| {
+            turn * (DVec3::new((n & 1) as f64, (n >> 1 & 1) as f64, (n >> 2) as f64) - 0.5)
+        };
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let halves = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        TriangleMesh { vertices: (0..8).map(corner).collect(), triangles: halves.collect() }
+    };
+    let how = MeshOptions { shape: ShapeOptions { cells: None, ..options().shape }, flip: false };
+    for turn in [DQuat::IDENTITY, DQuat::from_scaled_axis(DVec3::new(0.4, -0.3, 0.7))] {
+        let shape = shape_from_mesh(&cube(turn), &SourceFile::default(), &how).unwrap();
+        let feret = shape.morphology().feret.unwrap();
+        println!("{feret:?}");
+        close(feret[0], 3f64.sqrt(), 1e-9);
+        close(feret[1], 8f64.sqrt() / 3f64.sqrt(), 1e-3);
     }
 }

@@ -275,3 +275,22 @@ fn the_default_number_of_cells_is_lowered_for_small_grains_and_a_given_one_is_ke
     assert!((55.0..58.0).contains(&across(Some(56))));
     assert!((88.0..92.0).contains(&across(Some(90))));
 }
+
+/// A mask is one for any two values: no grey value lies between them.
+#[test]
+fn images_of_two_values_are_masks() {
+    let labels = voxelised(DVec3::new(12.0, 9.0, 7.0), DQuat::from_rotation_x(0.4), DVec3::ZERO);
+    let Voxels::Labels(mask) = &labels.voxels else { panic!("labels") };
+    let shape = |void: u32, solid: u32| {
+        let values = mask.iter().map(|m| if *m == 0 { void } else { solid }).collect();
+        let volume = Volume::from_labels(labels.dims, values).unwrap();
+        let how = ScanOptions { threshold: Some(Threshold::Otsu), ..options() };
+        only(&volume, &how).unwrap()
+    };
+    let expect = only(&labels, &options()).unwrap().volume();
+    for (void, solid) in [(0, 1), (0, 255), (0, 200), (0, 254), (1, 2), (40, 110)] {
+        let shape = shape(void, solid);
+        assert_eq!(shape.volume(), expect, "{void} and {solid}");
+        assert!(!shape.provenance().parameters.iter().any(|(name, _)| name == "surface"));
+    }
+}

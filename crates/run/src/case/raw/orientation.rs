@@ -73,7 +73,8 @@ impl Notation for Turns {
 pub enum Orientation {
     /// Unit quaternion, body to space.
     Quaternion(DQuat),
-    /// Directions of the longest, middle and shortest principal axis, one or two of them given.
+    /// Directions of the principal axes with the smallest, the middle and the largest moment of
+    /// inertia, one or two of them given.
     Axes([Option<DVec3>; 3]),
 }
 
@@ -91,11 +92,11 @@ pub struct OrientationTable {
     axis: Option<Direction>,
     /// Angle of the turn, right-handed [rad].
     angle: Option<Quantity<Angle>>,
-    /// Direction of the longest principal axis.
+    /// Direction of the principal axis with the smallest moment of inertia, mostly the longest.
     long_axis: Option<Direction>,
-    /// Direction of the middle principal axis.
+    /// Direction of the principal axis with the middle moment of inertia.
     middle_axis: Option<Direction>,
-    /// Direction of the shortest principal axis.
+    /// Direction of the principal axis with the largest moment of inertia, mostly the shortest.
     short_axis: Option<Direction>,
 }
 
