@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_formats::disk::write_atomically;
+use grainwake_formats::disk::{self, write_atomically};
 use grainwake_plot::Figure;
 
 use crate::error::{ReportError, Written as _};
@@ -48,7 +48,7 @@ pub fn remove_earlier_figures(folder: &Path, written: &[WrittenFigure]) -> Resul
     };
     for name in earlier.lines().filter(is_figure).filter(|name| !names.contains(name)) {
         let path = folder.join(name);
-        match std::fs::remove_file(&path) {
+        match disk::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 return Err(error).written(&path);
             }

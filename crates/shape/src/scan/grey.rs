@@ -8,12 +8,12 @@
 //! removed by setting the level to match the volume.
 
 use super::assumed::Assumed;
+use super::crop::{BAND, Crop, DEEPER, SOME_DEEP};
 use super::phases::{Phase, phases};
 use super::surroundings::Surroundings;
 use super::watershed::HALO;
 use super::{Mask, transform};
 use crate::filter::{Kernel, gaussian};
-use crate::grid;
 use std::f64::consts::SQRT_2;
 
 /// Grey values with the owner of each voxel: the label of its grain, combined with [`HALO`] in the
@@ -29,11 +29,6 @@ pub(crate) struct Grey {
     solid: Phase,
 }
 
-/// Distance from the surface beyond which a voxel is entirely solid or void [voxels].
-pub(super) const BAND: f32 = 2.7;
-/// Preferred additional distance from the band at which the grey values of a grain and of the void
-/// around it are sampled [voxels].
-pub(super) const DEEPER: f32 = 0.5;
 /// Depth of the core of a grain without deep voxels, relative to its largest depth: preferred and
 /// minimum.
 const CORE: [f32; 2] = [0.8, 0.5];
@@ -46,8 +41,6 @@ const ITERATIONS: usize = 8;
 pub(crate) const LAYERS: usize = 4;
 /// Depth at which blur hardly darkens a grain [standard deviations].
 const CLEAR_OF_BLUR: f64 = 2.5;
-/// Minimum number of deep voxels for the grey of a grain and of the void around it.
-pub(super) const SOME_DEEP: usize = 24;
 
 /// The solid fractions of one grain in a crop of the image, with the surface at zero.
 pub(crate) struct Cut {
@@ -91,7 +84,14 @@ impl Grey {
         let porous = (solid.solid != mask.solid).then(|| transform::signed(solid));
         // Distance from the surface or from the nearest cavity.
         let depth = porous.as_ref().unwrap_or(&distance);
-        let crop = Crop { image: self, dims, low };
+        let crop = Crop {
+            image_dims: self.dims,
+            values: &self.values,
+            owner: &self.owner,
+            outside: self.outside,
+            dims,
+            low,
+        };
         let mut assumed = Vec::new();
         let void = Surroundings::measure(&crop, mask, &distance, self.void);
         let void = void.unwrap_or_else(|| {
@@ -110,7 +110,7 @@ impl Grey {
         let own = deep.map(|grey| grey - void.mean).unwrap_or_else(|| {
             let above: Vec<f32> =
                 (0..distance.len()).map(|n| near(n).unwrap_or(0.0) as f32).collect();
-            let usual = self.solid.deep.then(|| self.solid.grey - void.mean);
+            let usual = self.solid.deep.then_some(self.solid.grey - void.mean);
             estimated_grey(&above, dims, depth, usual)
         });
         let share = |n: usize| -> f64 {
@@ -147,51 +147,6 @@ impl Grey {
             ],
             assumed,
         }
-    }
-}
-
-/// Part of an image around a grain.
-pub(super) struct Crop<'a> {
-    image: &'a Grey,
-    dims: [usize; 3],
-    /// Image coordinate of the first voxel, which may lie outside.
-    low: [isize; 3],
-}
-
-impl Crop<'_> {
-    /// Returns the index in the image of voxel `n` of the crop.
-    fn place(&self, n: usize) -> Option<usize> {
-        let (at, dims) = (grid::place(self.dims, n), self.image.dims);
-        let mut index = 0;
-        for axis in (0..3).rev() {
-            let i = usize::try_from(self.low[axis] + at[axis] as isize).ok()?;
-            if i >= dims[axis] {
-                return None;
-            }
-            index = index * dims[axis] + i;
-        }
-        Some(index)
-    }
-
-    /// Returns the grey value of voxel `n` if it lies inside the field of view.
-    pub(super) fn grey(&self, n: usize) -> Option<f32> {
-        let value = self.image.values[self.place(n)?];
-        (Some(value) != self.image.outside).then_some(value)
-    }
-
-    /// Returns whether voxel `n` belongs to a grain.
-    pub(super) fn is_solid(&self, n: usize) -> bool {
-        let owner = self.place(n).map_or(0, |m| self.image.owner[m]);
-        owner != 0 && owner & HALO == 0
-    }
-
-    /// Returns the mean grey of the voxels farther than `limit` from the surface and from cavities;
-    /// `None` if there are too few.
-    fn deep_grey(&self, depth: &[f32], limit: f32) -> Option<f64> {
-        let deep = (0..depth.len()).filter(|n| depth[*n] < -limit);
-        let deep: Vec<f64> =
-            deep.filter_map(|n| Some(f64::from(self.image.values[self.place(n)?]))).collect();
-        (deep.len() >= SOME_DEEP).then(|| deep.iter().sum::<f64>() / deep.len() as f64)
     }
 }
 

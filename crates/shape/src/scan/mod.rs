@@ -16,6 +16,7 @@
 
 mod assumed;
 mod build;
+mod crop;
 mod cure;
 mod description;
 mod field_of_view;
@@ -25,6 +26,7 @@ mod grey;
 mod header;
 mod looks_grey;
 mod meta;
+mod notes;
 mod npy;
 mod npz;
 mod nrrd;
@@ -43,10 +45,11 @@ mod transform;
 mod volume;
 mod watershed;
 
-pub use assumed::{Assumed, grey_notes};
+pub use assumed::Assumed;
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
 pub use cure::Cure;
 pub use geometry::StatedVoxel;
+pub use notes::grey_notes;
 pub use options::ScanOptions;
 pub use read::{read_volume, read_volume_and_voxel};
 pub use refusals::{Advice, Refusal};

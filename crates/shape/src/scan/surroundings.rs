@@ -1,7 +1,7 @@
 //! Grey value of the void around one grain, which need not be that of the whole image: grains may
 //! lie in a resin or a liquid, and the image around it hold air.
 
-use super::grey::{BAND, Crop, DEEPER, SOME_DEEP};
+use super::crop::{BAND, Crop, DEEPER, SOME_DEEP};
 use super::{Mask, transform};
 use crate::filter::gaussian;
 

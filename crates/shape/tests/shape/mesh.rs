@@ -708,8 +708,8 @@ fn a_regular_tetrahedron_is_accepted_for_any_position_of_its_tips() {
     }
 }
 
-/// The tetrahedron between the origin and one unit along each axis. Two of its principal moments are
-/// equal.
+/// The tetrahedron between the origin and one unit along each axis. Two of its principal moments
+/// are equal.
 fn corner(unit: f64) -> TriangleMesh {
     let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|v| unit * v).to_vec();
     TriangleMesh { vertices, triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] }

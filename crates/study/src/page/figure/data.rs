@@ -8,7 +8,7 @@ use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
-use super::legend::{LineStyle, OUTSIDE};
+use super::line_style::{LineStyle, OUTSIDE};
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;

@@ -8,7 +8,8 @@ use grainwake_plot::legend::Legend;
 use grainwake_plot::style::PAGE;
 
 use super::data::FigureData;
-use super::legend::{LineStyle, symbol_entry};
+use super::legend::symbol_entry;
+use super::line_style::LineStyle;
 use crate::analysis::factor_mean::{FactorMean, KISSING_SHARE};
 use crate::analysis::observation::unique;
 use crate::page::label::label;

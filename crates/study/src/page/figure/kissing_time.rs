@@ -10,7 +10,8 @@ use grainwake_plot::style::{BLUE, HAIR, INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
-use super::legend::{OUTSIDE, symbol_entry};
+use super::legend::symbol_entry;
+use super::line_style::OUTSIDE;
 use super::misses::{self, STRIP};
 use crate::analysis::observation::{Observation, observations};
 use crate::analysis::statistics::quantile;

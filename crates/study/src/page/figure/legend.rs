@@ -8,53 +8,9 @@ use grainwake_plot::style::{
 use grainwake_plot::text;
 
 use super::data::FigureData;
+use super::line_style::{LineStyle, MOST, OUTSIDE};
 use crate::analysis::observation::unique;
 use crate::plan::Run;
-
-const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
-/// Colours of up to four levels.
-const FOUR: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
-/// Number of lines that differ in colour or dash pattern.
-const MOST: usize = SERIES_COLOURS * DASHES.len();
-/// Style of a model outside the axes.
-pub const OUTSIDE: LineStyle = LineStyle { colour: INK, dash: None, sign: Marker::Circle };
-
-/// Line style of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineStyle {
-    /// Colour of the line and the symbols.
-    pub colour: &'static str,
-    /// Dash pattern of the line.
-    pub dash: Option<&'static str>,
-    /// Symbol of the points.
-    pub sign: Marker,
-}
-
-impl LineStyle {
-    /// Returns the n-th style; [`MOST`] lines and 36 symbols differ.
-    pub fn nth(n: usize) -> LineStyle {
-        let cycle = n / SERIES_COLOURS;
-        LineStyle {
-            colour: series_colour(n),
-            dash: DASHES[cycle % DASHES.len()],
-            sign: Marker::nth(n + cycle),
-        }
-    }
-
-    /// Returns the black style of the n-th level of an axis that has no colours, with the symbol of
-    /// [`LineStyle::of_level`].
-    fn of_second(n: usize) -> LineStyle {
-        LineStyle { colour: INK, dash: DASHES[n % DASHES.len()], sign: Marker::nth(n) }
-    }
-
-    /// Returns the style of the n-th of `count` levels of an axis.
-    pub fn of_level(n: usize, count: usize) -> LineStyle {
-        match FOUR.get(n).filter(|_| count <= FOUR.len()) {
-            Some(colour) => LineStyle { colour, dash: None, sign: Marker::nth(n) },
-            None => LineStyle::nth(n),
-        }
-    }
-}
 
 /// Returns the entry of a legend with a symbol.
 pub fn symbol_entry(name: &str, style: LineStyle) -> Entry {

@@ -5,7 +5,7 @@ use grainwake_plot::frame::{Fill, Frame, Marker};
 use grainwake_plot::legend::Entry;
 use grainwake_plot::style::{FAINT, INK};
 
-use super::legend::LineStyle;
+use super::line_style::LineStyle;
 use crate::analysis::observation::Observation;
 
 /// Height of the strip [pt].

@@ -8,6 +8,7 @@ mod histories;
 mod kissing_share;
 mod kissing_time;
 mod legend;
+mod line_style;
 mod misses;
 mod overview;
 mod panels;

@@ -8,7 +8,8 @@ use grainwake_plot::style::{INK, PAGE, TEXT};
 use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
-use super::legend::{LineStyle, symbol_entry};
+use super::legend::symbol_entry;
+use super::line_style::LineStyle;
 use crate::analysis::correlation::Correlation;
 use crate::page::label::name_of;
 
