@@ -303,6 +303,22 @@ def test_voxels_without_a_value_are_refused():
         gw.scan(image, voxel="50 um", threshold=0.5)
 
 
+def test_a_grain_without_voxels_free_of_blur_gives_a_warning():
+    z, y, x = np.meshgrid(*[np.arange(n) - n / 2 + 0.3 for n in (24, 40, 48)], indexing="ij")
+    depth = np.minimum(np.minimum(14 - abs(x), 10 - abs(y)), 2 - abs(z))
+    image = 60 + 100 * np.clip(0.5 + 0.3 * depth, 0, 1)
+    image += np.random.default_rng(1).normal(0, 3, image.shape)
+    with pytest.warns(gw.CaseWarning, match="grey value of the solid is uncertain for 1 grain"):
+        gw.scan(image, voxel="50 um", threshold="otsu", roundness=False)
+
+
+def test_a_mesh_that_needs_more_cells_is_refused_with_their_number():
+    corner = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    with pytest.raises(gw.CaseError, match="cells=70 resolves it"):
+        gw.Grain.from_mesh((corner, faces), unit="mm")
+
+
 def test_a_stated_voxel_size_is_compared(tmp_path):
     file = tmp_path / "ball.nrrd"
     header = (

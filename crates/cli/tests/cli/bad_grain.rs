@@ -85,6 +85,27 @@ fn the_cube_itself_is_taken_with_a_bare_unit() {
     assert!(message.contains("1.000000e-9 m3"), "{message}");
 }
 
+/// Sharp corners need more cells than the default; the message names a number that works.
+#[test]
+fn a_mesh_that_needs_more_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("corner.stl");
+    let [o, x, y, z] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    stl(&mesh, &[[o, y, x], [o, x, z], [x, y, z], [y, o, z]]);
+    let out = folder.path().join("corner.grain");
+    for unit in ["mm", "1 m"] {
+        let run = |more: &[&str]| {
+            let mut program = grainwake();
+            program.args(["grain", "from-mesh"]).arg(&mesh).args(["--unit", unit]);
+            program.args(more).arg("--force").arg("-o").arg(&out).assert()
+        };
+        let refused = run(&[]).code(2);
+        let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(message.contains("--cells 70 resolves it"), "{message}");
+        run(&["--cells", "70"]).success();
+    }
+}
+
 #[test]
 fn outputs_that_are_inputs_or_have_the_name_of_something_else() {
     let folder = tempfile::tempdir().unwrap();

@@ -105,6 +105,25 @@ fn specks_are_told_and_a_second_body_is_rejected_with_the_option() {
     assert!(told.contains("specks removed from 1 grain, at most 7."), "{told}");
 }
 
+/// A plate of 4 voxels between blurred surfaces.
+#[test]
+fn a_grain_without_voxels_free_of_blur_has_a_note() {
+    let folder = tempfile::tempdir().unwrap();
+    let plate = |n: usize| {
+        let x = [n % N, n / N % N, n / N / N].map(|i| (i as f64 - 31.7).abs());
+        let depth = [14.0 - x[0], 10.0 - x[1], 2.0 - x[2]].into_iter().fold(9.0, f64::min);
+        let texture = (n * 2_654_435_761 % 97) as f64 / 24.0;
+        (60.0 + 100.0 * (0.5 + 0.3 * depth).clamp(0.0, 1.0) + texture) as u8
+    };
+    let image: Vec<u8> = (0..N * N * N).map(plate).collect();
+    let message = from_scan(folder.path(), &image, &["--threshold", "otsu"], 0);
+    let note = "note: the grey value of the solid is uncertain for 1 grain with";
+    assert!(message.contains(note) && message.contains(": label 1"), "{message}");
+    let message =
+        from_scan(folder.path(), &masked(), &["--threshold", "otsu", "--split", "--force"], 0);
+    assert!(!message.contains("uncertain"), "{message}");
+}
+
 #[test]
 fn the_voxel_size_of_the_file_is_compared() {
     let folder = tempfile::tempdir().unwrap();
