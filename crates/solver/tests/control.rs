@@ -240,7 +240,8 @@ fn a_very_short_step_is_forgotten() {
 fn the_step_after_a_set_velocity_or_load_keeps_the_cfl_number() {
     let limits = StepRule::Limits { cfl: 0.4, viscous: 0.2, max_step: f64::INFINITY };
     // A load goes on to accelerate the grain, which each step notices one step late.
-    let controls: [(&str, f64, fn(&mut Simulation)); 4] = [
+    type Control = fn(&mut Simulation);
+    let controls: [(&str, f64, Control); 4] = [
         ("set", 0.45, |sim| sim.set_velocity(0, TRANSLATION, DVec3::new(0.2, 0.0, 0.2)).unwrap()),
         ("prescribed", 0.45, |sim| sim.prescribe_velocity(0, TRANSLATION, DVec3::X * 0.3).unwrap()),
         ("turned", 0.45, |sim| sim.prescribe_velocity(0, ROTATION, DVec3::Z * 300.0).unwrap()),

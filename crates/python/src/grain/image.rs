@@ -130,8 +130,8 @@ impl PyGrain {
     ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
     ///     booleans are labels with 0 for background, floating numbers are grey values.
     /// voxel : float or str
-    ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, as does
-    ///     a grain with too few voxels free of blur to measure its grey value.
+    ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, and so
+    ///     does a grain with too few voxels free of blur to measure its grey value.
     /// label : int, optional
     ///     Label of a single grain.
     /// threshold : float or {"otsu", "otsu3"}, optional

@@ -56,9 +56,9 @@ pub struct RawGrain {
     pub motion: Located<RawMotion>,
 }
 
-/// A closed form. Which sizes belong to it depends on `kind`. In the frame of the body the moment of
-/// inertia about x is the smallest and the one about z the largest, whatever the order of `size`;
-/// `orientation` turns it from there.
+/// A closed form. Which sizes belong to it depends on `kind`. In the frame of the body the moment
+/// of inertia about x is the smallest and the one about z the largest, whatever the order of
+/// `size`; `orientation` turns it from there.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawShape {

@@ -1,14 +1,12 @@
 //! Line styles of runs in the overview figures, and their legend.
 
-use grainwake_plot::frame::{Fill, Marker};
+use grainwake_plot::frame::Fill;
 use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{
-    BLUE, GREEN, INK, ORANGE, PAGE, SERIES_COLOURS, VERMILION, series_colour,
-};
+use grainwake_plot::style::{PAGE, SERIES_COLOURS};
 use grainwake_plot::text;
 
 use super::data::FigureData;
-use super::line_style::{LineStyle, MOST, OUTSIDE};
+use super::line_style::{DASHES, LineStyle, MOST, OUTSIDE};
 use crate::analysis::observation::unique;
 use crate::plan::Run;
 

@@ -3,7 +3,8 @@
 use grainwake_plot::frame::Marker;
 use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, SERIES_COLOURS, VERMILION, series_colour};
 
-const DASHES: [Option<&str>; 4] = [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
+pub(super) const DASHES: [Option<&str>; 4] =
+    [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
 /// Colours of up to four levels.
 const FOUR: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 /// Number of lines that differ in colour or dash pattern.
