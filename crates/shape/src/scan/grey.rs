@@ -9,7 +9,7 @@
 
 use super::assumed::Assumed;
 use super::crop::{BAND, Crop, DEEPER, SOME_DEEP};
-use super::phases::{Phase, phases};
+use super::phases::{Phases, phases};
 use super::surroundings::Surroundings;
 use super::watershed::HALO;
 use super::{Mask, transform};
@@ -24,9 +24,7 @@ pub(crate) struct Grey {
     pub owner: Vec<u32>,
     /// Grey value outside the field of view.
     pub outside: Option<f32>,
-    /// Mean grey value of the void.
-    pub void: f64,
-    solid: Phase,
+    phases: Phases,
 }
 
 /// Depth of the core of a grain without deep voxels, relative to its largest depth: preferred and
@@ -65,8 +63,8 @@ impl Grey {
         owner: Vec<u32>,
         outside: Option<f32>,
     ) -> Grey {
-        let [void, solid] = phases(dims, &values, &owner, outside);
-        Grey { dims, values, owner, outside, void: void.grey, solid }
+        let phases = phases(dims, &values, &owner, outside);
+        Grey { dims, values, owner, outside, phases }
     }
 
     /// Returns the grain `label`. `mask` contains its solid voxels with cavities filled, `solid`
@@ -93,10 +91,11 @@ impl Grey {
             low,
         };
         let mut assumed = Vec::new();
-        let void = Surroundings::measure(&crop, mask, &distance, self.void);
+        let Phases { void: usual_void, solid: usual_solid, solid_is_deep } = self.phases;
+        let void = Surroundings::measure(&crop, mask, &distance, usual_void);
         let void = void.unwrap_or_else(|| {
-            assumed.push((Assumed::Void, self.void));
-            Surroundings::uniform(self.void)
+            assumed.push((Assumed::Void, usual_void));
+            Surroundings::uniform(usual_void)
         });
         // Grey above the void of the voxels that the surface may cut.
         let near = |n: usize| {
@@ -105,12 +104,12 @@ impl Grey {
         };
         // Voxels just beyond the band are slightly darkened. They are better than an estimate from
         // the grey of other grains, which may differ, but not than one from the grain alone.
-        let limits = [Some(BAND + DEEPER), self.solid.deep.then_some(BAND)];
+        let limits = [Some(BAND + DEEPER), solid_is_deep.then_some(BAND)];
         let deep = limits.into_iter().flatten().find_map(|limit| crop.deep_grey(depth, limit));
         let own = deep.map(|grey| grey - void.mean).unwrap_or_else(|| {
             let above: Vec<f32> =
                 (0..distance.len()).map(|n| near(n).unwrap_or(0.0) as f32).collect();
-            let usual = self.solid.deep.then_some(self.solid.grey - void.mean);
+            let usual = solid_is_deep.then_some(usual_solid - void.mean);
             estimated_grey(&above, dims, depth, usual)
         });
         let share = |n: usize| -> f64 {

@@ -1,6 +1,7 @@
 //! Mean grey values of the phases of an image.
 
 use super::watershed::HALO;
+use crate::grid;
 use rayon::prelude::*;
 
 /// Number of voxels sufficient for the mean grey values of an image.
@@ -13,12 +14,15 @@ const SOME_DEEP: u64 = 24;
 /// Steps along the axes without a voxel of the other phase that make a voxel deep.
 const CLEAR: usize = 4;
 
-/// Mean grey value of a phase.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Phase {
-    pub grey: f64,
-    /// Whether enough voxels are far from the other phase, so that blur does not change the mean.
-    pub deep: bool,
+/// Distance without void around a voxel of the solid that blur does not darken [voxels].
+const UNBLURRED: f64 = 3.7;
+
+/// Mean grey values of void and of solid.
+pub(crate) struct Phases {
+    pub void: f64,
+    pub solid: f64,
+    /// Whether the solid has voxels that blur does not darken.
+    pub solid_is_deep: bool,
 }
 
 /// Computes the mean grey values of void and of solid from voxels without the other phase within
@@ -30,7 +34,7 @@ pub(super) fn phases(
     values: &[f32],
     owner: &[u32],
     outside: Option<f32>,
-) -> [Phase; 2] {
+) -> Phases {
     let is_solid = |n: usize| owner[n] != 0 && owner[n] & HALO == 0;
     // For large images a fraction of the rows suffices, unless few voxels are deep.
     let share = (values.len() / ENOUGH).max(1);
@@ -38,7 +42,34 @@ pub(super) fn phases(
     if share > 1 && grey.iter().any(|(_, deep)| *deep < FEW_DEEP) {
         grey = mean_grey(dims, values, outside, is_solid, 1);
     }
-    grey.map(|(grey, deep)| Phase { grey, deep: deep >= SOME_DEEP })
+    let [(void, _), (solid, _)] = grey;
+    Phases { void, solid, solid_is_deep: has_deep_solid(dims, is_solid) }
+}
+
+/// Returns whether at least [`SOME_DEEP`] voxels of the solid have no void within [`UNBLURRED`] in
+/// any direction: a thin plate oblique to the axes has none, although its voxels may be clear along
+/// the axes.
+fn has_deep_solid(dims: [usize; 3], is_solid: impl Fn(usize) -> bool + Sync) -> bool {
+    let reach = UNBLURRED as isize;
+    let steps = || -reach..=reach;
+    let around: Vec<[isize; 3]> = steps()
+        .flat_map(|k| steps().flat_map(move |j| steps().map(move |i| [i, j, k])))
+        .filter(|[i, j, k]| ((i * i + j * j + k * k) as f64) < UNBLURRED * UNBLURRED)
+        .collect();
+    let is_deep = |n: &usize| {
+        let at = grid::place(dims, *n);
+        is_solid(*n)
+            && clear(dims, *n, |m| !is_solid(m)) == CLEAR
+            && around.iter().all(|step| {
+                let to: [usize; 3] =
+                    std::array::from_fn(|axis| at[axis].wrapping_add_signed(step[axis]));
+                (0..3).any(|axis| to[axis] >= dims[axis]) || is_solid(grid::index(dims, to))
+            })
+    };
+    let slice = dims[0] * dims[1];
+    let some = SOME_DEEP as usize;
+    let slices = (0..dims[2]).into_par_iter().map(|k| slice * k..slice * (k + 1));
+    slices.map(|slice| slice.filter(is_deep).take(some).count()).sum::<usize>() >= some
 }
 
 /// Returns the number of steps along the axes, in all directions, without a voxel of the kind
@@ -102,6 +133,23 @@ fn mean_grey(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn oblique_plates_have_no_deep_solid() {
+        let dims = [40, 40, 40];
+        // Distance from the middle plane along the diagonal of the image [voxels].
+        let plate = |half: f64| {
+            move |n: usize| {
+                let at = [n % 40, n / 40 % 40, n / 1600];
+                (at.iter().sum::<usize>() as f64 - 58.5).abs() / 3f64.sqrt() < half
+            }
+        };
+        for (half, deep) in [(2.5, false), (3.0, false), (4.5, true)] {
+            assert_eq!(has_deep_solid(dims, plate(half)), deep, "{half}");
+        }
+        let clear = |n: usize| clear(dims, n, |m| !plate(3.0)(m)) == CLEAR;
+        assert!((0..64_000).filter(|n| plate(3.0)(*n) && clear(*n)).count() > 100);
+    }
 
     #[test]
     fn a_share_of_the_rows_gives_the_grey_of_all() {
