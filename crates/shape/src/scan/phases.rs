@@ -21,7 +21,7 @@ const UNBLURRED: f64 = 3.7;
 pub(crate) struct Phases {
     pub void: f64,
     pub solid: f64,
-    /// Whether the solid has voxels that blur does not darken.
+    /// Whether some voxels of the solid lie so deep that blur does not darken them.
     pub solid_is_deep: bool,
 }
 

@@ -157,8 +157,10 @@ impl Simulation {
         let lever_arm = grain.shape.bounding_radius() / grain.principal_inertia().min_element();
         let acceleration =
             change.force.length() / grain.mass() + lever_arm * change.torque.length();
-        let longest = self.setup.longest_step_from_rest(acceleration);
-        self.clock.longest_next = self.clock.longest_next.min(longest);
+        if self.fluid.is_some() {
+            let longest = self.setup.longest_step_from_rest(acceleration);
+            self.clock.longest_next = self.clock.longest_next.min(longest);
+        }
         Ok(())
     }
 

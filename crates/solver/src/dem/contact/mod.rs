@@ -94,7 +94,7 @@ pub(in crate::dem) struct ContactRecord {
     pub next_history: Vec<TangentialHistory>,
     /// Penetrating points of the last search.
     pub patch: ContactPatch,
-    /// Whether the last search had to look for penetrating points.
+    /// Whether the pair was near enough at the last search to have loads.
     pub may_interact: bool,
     /// Closest points of a pair without penetrating points, if a force acts across the gap.
     pub closest: Option<ContactPoint>,

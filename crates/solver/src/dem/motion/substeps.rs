@@ -44,10 +44,16 @@ impl ContactDynamics {
     /// Returns the number of sub-steps.
     fn run_substeps(&mut self, grains: &mut [Grain], dt: f64) -> usize {
         let damping = self.model.params.global_damping;
-        self.find_contacts(grains, 0.0);
+        // The number of sub-steps follows from the overlaps, and the dashpots from the sub-step.
+        self.update_kinematics(grains, 0.0);
+        self.for_each_record(|contacts, record| contacts.find_points(record, grains));
         let (mut done, mut time_left) = (0, dt);
         let mut substeps_left = self.substeps_for(grains, time_left);
-        self.compute_contacts(grains, [0.0, dt / substeps_left as f64]);
+        let stable_step = dt / substeps_left as f64;
+        self.for_each_record(|contacts, record| {
+            contacts.evaluate_pair(record, grains, [0.0, stable_step]);
+        });
+        self.sum_loads();
         while substeps_left > 0 {
             let step = time_left / substeps_left as f64;
             let half_mean = 0.5 * step / dt;
@@ -64,8 +70,12 @@ impl ContactDynamics {
                     substeps_left = self.substeps_for(grains, time_left);
                 }
             }
-            self.find_contacts(grains, step);
-            self.compute_contacts(grains, [step; 2]);
+            self.update_kinematics(grains, step);
+            self.for_each_record(|contacts, record| {
+                contacts.find_points(record, grains);
+                contacts.evaluate_pair(record, grains, [step; 2]);
+            });
+            self.sum_loads();
             for (grain, body) in grains.iter_mut().zip(&mut self.bodies) {
                 body.mean_contact += body.contact * half_mean;
                 body.second_half_step(grain, damping, step);
@@ -164,13 +174,12 @@ impl ContactDynamics {
         (&self.bodies[key.grain as usize], key.partner.grain().map(|j| &self.bodies[j]))
     }
 
-    /// Finds the penetrating points of all pairs at the present poses; `step` [s] is the time since
-    /// the last search.
-    fn find_contacts(&mut self, grains: &[Grain], step: f64) {
+    /// Takes the present poses and velocities of the grains, and clears their contact loads; `step`
+    /// [s] is the time since the last evaluation.
+    fn update_kinematics(&mut self, grains: &[Grain], step: f64) {
         for (grain, body) in grains.iter().zip(&mut self.bodies) {
             body.update_kinematics(grain, step);
         }
-        self.for_each_record(|contacts, record| contacts.find_points(record, grains));
     }
 
     /// Calls `each` for all pairs. Each pair writes its own record, so results do not depend on the
@@ -185,10 +194,8 @@ impl ContactDynamics {
         self.records = records;
     }
 
-    /// Evaluates the loads of the penetrating points; `steps` are the time since the last
-    /// evaluation and the sub-step in which dashpots must be stable [s].
-    fn compute_contacts(&mut self, grains: &[Grain], steps: [f64; 2]) {
-        self.for_each_record(|contacts, record| contacts.evaluate_pair(record, grains, steps));
+    /// Sums the loads of all pairs over the grains, in the order of the pairs.
+    fn sum_loads(&mut self) {
         for record in &self.records {
             self.bodies[record.key.grain as usize].contact += record.loads.on_grain;
             if let Partner::Grain(j) = record.key.partner {
@@ -223,7 +230,8 @@ impl ContactDynamics {
         record.loads.overlap = overlaps.fold(0.0, f64::max);
     }
 
-    /// Evaluates the loads of a pair at the points found (Eqs 9-18).
+    /// Evaluates the loads of a pair at the points found (Eqs 9-18). `step` [s] is the time since
+    /// the last evaluation, `stable_step` [s] the sub-step in which dashpots must be stable.
     fn evaluate_pair(
         &self,
         record: &mut ContactRecord,
