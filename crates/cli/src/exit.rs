@@ -183,7 +183,7 @@ pub fn shape_help(error: &ShapeError) -> Option<String> {
             ));
         }
         ShapeError::Quality { cells: Some(cells), .. } => {
-            return Some(format!("--cells {cells} resolves it (default: 56)"));
+            return Some(format!("--cells {cells} resolves it"));
         }
         ShapeError::InsideOut { .. } => "--flip inverts its normals",
         ShapeError::TooFewVoxels { .. } => "scan at a higher resolution, or omit the grain",

@@ -176,7 +176,7 @@ fn advice(error: &ShapeError) -> Option<String> {
              largest"
         }
         ShapeError::Quality { cells: Some(cells), .. } => {
-            return Some(format!("cells={cells} resolves it (default: 56)"));
+            return Some(format!("cells={cells} resolves it"));
         }
         ShapeError::InsideOut { .. } => "flip=True inverts its normals",
         ShapeError::TooFewVoxels { .. } => "scan at a higher resolution, or omit the grain",
