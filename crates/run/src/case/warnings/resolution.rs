@@ -52,7 +52,7 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         let error = thin_layer_drag_error(n, re);
         if error > LARGEST_DRAG_ERROR {
             found.push(format!(
-                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): expect the drag {} too low; {} cells reduce the error to 3 %: {finer}",
+                "at Re {re:.0} and {n:.1} cells per diameter the boundary layer is not resolved (its thickness is about {:.1} cells): the drag may be up to {} too low; {} cells reduce the error to 3 %: {finer}",
                 n / re.sqrt(),
                 drag_error_text(error, 0),
                 cells_for_drag_error(0.03, re)
