@@ -33,7 +33,8 @@ impl Watch {
     /// Processes the state after a step and returns its events, oldest first.
     pub fn update(&mut self, sim: &Simulation) -> Vec<Event> {
         let gap = pair_gap(sim, &self.enclosure);
-        self.tracker.update(sim.time(), sim.grains(), sim.contacts(), gap)
+        let velocity = |grain| sim.grain_velocity(grain);
+        self.tracker.update(sim.time(), sim.grains(), velocity, sim.contacts(), gap)
     }
 
     /// Returns the stop condition, if it has held for its time.

@@ -121,7 +121,8 @@ fn a_grain_leaves_through_an_outflow_as_if_the_domain_went_on() {
     let mut tracker = Tracker::new(params, short.grains(), None);
     for _ in 0..200 {
         step(&mut short);
-        tracker.update(short.time(), short.grains(), short.contacts(), None);
+        let velocity = |grain| short.grain_velocity(grain);
+        tracker.update(short.time(), short.grains(), velocity, short.contacts(), None);
         balance = balance.max(short.diagnostics().momentum_residual);
     }
     assert!(short.grains()[0].has_left());

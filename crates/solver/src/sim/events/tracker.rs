@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::pair::Pair;
 use super::{Event, EventKind, EventParams, Phase, StopWhen};
 use crate::dem::{Contact, Grain, MotionConstraint, Partner};
+use crate::math::RigidVelocity;
 
 /// Detects events of the grains from step to step; its state is part of a checkpoint.
 #[derive(Clone, Debug)]
@@ -41,17 +42,20 @@ impl Tracker {
         Tracker { params, state }
     }
 
-    /// Processes the state after a step and returns its events, oldest first.
+    /// Processes the state after a step and returns its events, oldest first; `velocity` returns
+    /// the velocity with which a grain moves
+    /// ([`Simulation::grain_velocity`](crate::sim::Simulation::grain_velocity)).
     pub fn update(
         &mut self,
         time: f64,
         grains: &[Grain],
+        velocity: impl Fn(usize) -> RigidVelocity,
         contacts: &[Contact],
         gap: Option<f64>,
     ) -> Vec<Event> {
         let first = self.state.events.len();
-        for (peak, grain) in self.state.peak_settling_speed.iter_mut().zip(grains) {
-            *peak = peak.max(grain.velocity.dot(self.params.down));
+        for (index, peak) in self.state.peak_settling_speed.iter_mut().enumerate() {
+            *peak = peak.max(velocity(index).linear.dot(self.params.down));
         }
         self.update_left(time, grains);
         if let ([a, b], Some(gap), Some(pair)) = (grains, gap, &mut self.state.pair) {
@@ -66,7 +70,7 @@ impl Tracker {
             self.state.events.extend(events);
         }
         self.update_landing(time, contacts);
-        self.update_rest(time, grains, contacts);
+        self.update_rest(time, grains, velocity, contacts);
         self.state.events[first..].to_vec()
     }
 
@@ -95,7 +99,13 @@ impl Tracker {
         }
     }
 
-    fn update_rest(&mut self, time: f64, grains: &[Grain], contacts: &[Contact]) {
+    fn update_rest(
+        &mut self,
+        time: f64,
+        grains: &[Grain],
+        velocity: impl Fn(usize) -> RigidVelocity,
+        contacts: &[Contact],
+    ) {
         let mut supported = vec![false; grains.len()];
         for contact in contacts {
             supported[contact.grain] = true;
@@ -103,12 +113,12 @@ impl Tracker {
                 supported[other] = true;
             }
         }
-        let free = grains.iter().zip(supported).filter(|(grain, _)| may_settle(grain));
-        let mut free = free.peekable();
+        let mut free = (0..grains.len()).filter(|index| may_settle(&grains[*index])).peekable();
         let still = free.peek().is_some()
-            && free.all(|(grain, supported)| {
-                let spin = grain.angular_velocity.length() * grain.shape.bounding_radius();
-                supported && grain.velocity.length() + spin < self.params.rest_speed
+            && free.all(|index| {
+                let RigidVelocity { linear, angular } = velocity(index);
+                let spin = angular.length() * grains[index].shape.bounding_radius();
+                supported[index] && linear.length() + spin < self.params.rest_speed
             });
         self.state.still_since = if still { self.state.still_since.or(Some(time)) } else { None };
     }

@@ -14,7 +14,7 @@ use crate::analysis::observation::unique;
 const LEFT: f64 = 42.0;
 const GAP: f64 = 20.0;
 const HEIGHT: f64 = 140.0;
-/// Height of the title above a panel [pt].
+/// Height of the title above a panel with the name of its grid [pt].
 const TITLE: f64 = 20.0;
 /// Largest number of panels in a row.
 const ACROSS: usize = 2;
@@ -39,16 +39,17 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         let style = data.level_style(by, name);
         Entry::line(text::literal(name), style.colour, style.dash)
     };
+    let title = if grids.is_empty() { 0.0 } else { TITLE };
     let legend = Legend::new(names.iter().map(entry), PAGE - LEFT);
     let top = legend.height() + 8.0;
     let rows = panels.div_ceil(across) as f64;
-    let mut drawing = Drawing::new(PAGE, top + rows * (HEIGHT + TITLE) + 26.0);
+    let mut drawing = Drawing::new(PAGE, top + rows * (HEIGHT + title) + 26.0);
     legend.draw(&mut drawing, (LEFT, 5.0));
     for panel in 0..panels {
         let (column, row) = (panel % across, panel / across);
         let frame = Frame {
             x: LEFT + column as f64 * (width + GAP),
-            y: top + TITLE + row as f64 * (HEIGHT + TITLE),
+            y: top + title + row as f64 * (HEIGHT + title),
             width,
             height: HEIGHT,
             across: Axis::linear("*t* √(*g*/*d*)  [–]", 0.0, end, 6, AxisRange::Tight),
@@ -56,8 +57,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         };
         frame.grid(&mut drawing);
         if let Some(grid) = grids.get(panel) {
-            let title = format!("{}  {}", letter(panel), text::literal(grid));
-            drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &title);
+            let name = format!("{}  {}", letter(panel), text::literal(grid));
+            drawing.text((frame.x, frame.y - 4.0), Anchor::Start, &name);
         }
         for level in shown.iter().filter(|l| l.grid.as_ref() == grids.get(panel)) {
             let style = data.level_style(by, &level.level);
