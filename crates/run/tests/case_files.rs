@@ -640,7 +640,17 @@ fn grains_next_to_an_open_side_or_off_the_middle_of_a_flat_box_are_warned_of() {
     let starts = warnings(&case("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.675 mm\"]"));
     assert!(starts.contains("grain 0 starts within two cells of the open upper side"), "{starts}");
     let flat = warnings(&case("[30, 1, 60]", "[\"1.5 mm\", \"0.06 mm\", \"3 mm\"]"));
+    assert!(flat.contains("grains move in its plane only"), "{flat}");
     assert!(flat.contains("its centre is at 60 um") || flat.contains("0.06 mm"), "{flat}");
+    let leaving = format!(
+        "{}[[grain]]\nshape = {{ kind = \"sphere\", diameter = \"0.1 mm\" }}\ndensity = 2000\nposition = \
+         [\"2.5 mm\", \"0.05 mm\", \"5 mm\"]\nangular_velocity = [0, 0, 1]\n",
+        case("[30, 1, 60]", "[\"1.5 mm\", \"0.05 mm\", \"3 mm\"]")
+            .replace("[time]\nend = 0.1\n", "")
+    ) + "[time]\nend = 0.1\n";
+    let [problem] = &problems(&leaving)[..] else { panic!("{:?}", problems(&leaving)) };
+    assert!(problem.to_string().contains("grain 1 starts out of the plane"), "{problem}");
+    assert_eq!(problem.key.as_deref(), Some("grain.1.position"));
     for (cells, position) in [
         ("[30, 30, 60]", "[\"1.5 mm\", \"1.5 mm\", \"5.575 mm\"]"),
         ("[30, 1, 60]", "[\"1.5 mm\", \"0.05 mm\", \"3 mm\"]"),

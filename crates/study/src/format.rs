@@ -45,11 +45,20 @@ pub fn percent(value: f64) -> String {
 }
 
 /// Returns the start of a sentence about models without an event: "1 model, whose pair landed or
-/// whose run ended before, has".
-pub fn missed(models: usize) -> String {
-    match models {
-        1 => "1 model, whose pair landed or whose run ended before, has".to_owned(),
-        n => format!("{n} models, whose pairs landed or whose runs ended before, have"),
+/// whose run ended before, has". `several` if models have several runs, of which half or more have
+/// no event then.
+pub fn missed(models: usize, several: bool) -> String {
+    match (models, several) {
+        (1, false) => "1 model, whose pair landed or whose run ended before, has".to_owned(),
+        (n, false) => format!("{n} models, whose pairs landed or whose runs ended before, have"),
+        (1, true) => {
+            "1 model, in half or more of whose runs the pair landed or the run ended before, has"
+                .to_owned()
+        }
+        (n, true) => format!(
+            "{n} models, in half or more of whose runs the pair landed or the run ended before, \
+             have"
+        ),
     }
 }
 

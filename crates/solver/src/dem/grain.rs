@@ -71,6 +71,9 @@ pub struct Grain {
     pub translation: MotionConstraint,
     /// Rotational degrees of freedom.
     pub rotation: MotionConstraint,
+    /// Axis normal to the plane in which the grain moves, if it does: as far as it is free, it does
+    /// not move along this axis and turns about it only.
+    pub plane_normal: Option<usize>,
 }
 
 impl Grain {
@@ -93,6 +96,37 @@ impl Grain {
     pub fn rigid_velocity(&self) -> RigidVelocity {
         RigidVelocity { linear: self.velocity, angular: self.angular_velocity }
     }
+    /// Whether the six degrees of freedom, translation along and rotation about x, y and z, follow
+    /// the equations of motion.
+    pub fn free_axes(&self) -> [bool; 6] {
+        let [translates, turns] =
+            [self.translation, self.rotation].map(|c| c == MotionConstraint::Free);
+        std::array::from_fn(|n| match self.plane_normal {
+            Some(normal) if n < 3 => translates && n != normal,
+            Some(normal) => turns && n - 3 == normal,
+            None => {
+                if n < 3 {
+                    translates
+                } else {
+                    turns
+                }
+            }
+        })
+    }
+    /// Whether a free velocity would take the grain out of the plane with this normal axis.
+    pub fn leaves_plane(&self, normal: usize) -> bool {
+        let RigidVelocity { linear, mut angular } = self.rigid_velocity();
+        angular[normal] = 0.0;
+        self.translation == MotionConstraint::Free && linear[normal] != 0.0
+            || self.rotation == MotionConstraint::Free && angular != DVec3::ZERO
+    }
+    /// A vector less its component out of the plane of motion.
+    pub fn in_plane(&self, mut vector: DVec3) -> DVec3 {
+        if let Some(normal) = self.plane_normal {
+            vector[normal] = 0.0;
+        }
+        vector
+    }
     /// Mass [kg].
     pub fn mass(&self) -> f64 {
         self.density * self.shape.volume()
@@ -101,6 +135,14 @@ impl Grain {
     pub fn inertia(&self) -> DMat3 {
         let rotation = DMat3::from_quat(self.pose.orientation);
         rotation * DMat3::from_diagonal(self.principal_inertia()) * rotation.transpose()
+    }
+    /// Angular acceleration at rest under a torque about the centroid, or change of the angular
+    /// velocity by an angular impulse, of a grain that turns freely [space frame].
+    pub fn angular_response(&self, torque: DVec3) -> DVec3 {
+        match self.plane_normal {
+            Some(n) => torque[n] / self.inertia().col(n)[n] * DVec3::AXES[n],
+            None => self.inertia().inverse() * torque,
+        }
     }
     /// Principal moments of inertia [kg m^2].
     pub fn principal_inertia(&self) -> DVec3 {

@@ -20,6 +20,7 @@ impl Grain {
             angular_velocity: DVec3::ZERO,
             translation: MotionConstraint::Free,
             rotation: MotionConstraint::Free,
+            plane_normal: None,
         }
     }
     /// Replaces the position of the centroid [m].

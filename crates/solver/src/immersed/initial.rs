@@ -186,10 +186,10 @@ impl Released {
 fn free_change(grain: &Grain, impulse: &Vector6) -> RigidVelocity {
     let mut change = RigidVelocity::default();
     if grain.translation == MotionConstraint::Free {
-        change.linear = DVec3::from_slice(&impulse[..3]) / grain.mass();
+        change.linear = grain.in_plane(DVec3::from_slice(&impulse[..3])) / grain.mass();
     }
     if grain.rotation == MotionConstraint::Free && !is_sphere(&grain.shape) {
-        change.angular = grain.inertia().inverse() * DVec3::from_slice(&impulse[3..]);
+        change.angular = grain.angular_response(DVec3::from_slice(&impulse[3..]));
     }
     change
 }

@@ -143,8 +143,8 @@ impl RigidBodySystem {
                 }
             }
         }
-        let (free, prescribed) = (free(grain), grain.rigid_velocity().to_vector());
-        for row in (0..6).filter(|row| !free[row / 3]) {
+        let (free, prescribed) = (grain.free_axes(), grain.rigid_velocity().to_vector());
+        for row in (0..6).filter(|row| !free[*row]) {
             a[row] = [0.0; 6];
             a[row][row] = 1.0;
             b[row] = prescribed[row];
@@ -160,9 +160,9 @@ impl RigidBodySystem {
         contact: Load,
         dt: f64,
     ) -> RigidVelocity {
-        let (mut right, free) = (self.right, free(grain));
+        let (mut right, free) = (self.right, grain.free_axes());
         let load = [contact.force, contact.torque];
-        for row in (0..6).filter(|row| free[row / 3]) {
+        for row in (0..6).filter(|row| free[*row]) {
             right[row] += dt * load[row / 3][row % 3];
         }
         // Singular only if no face is forced; such a grain keeps its velocities.
@@ -222,25 +222,26 @@ impl RigidBodySystem {
         dt: f64,
     ) -> GrainResponse {
         let start = previous.start_velocity() - previous.pending_added_mass_velocity;
-        let free = free(grain);
+        let free = grain.free_axes();
         // Load that changes the initial velocities over dt, with the matrix before mass is added.
         let momentum = multiply6(&self.matrix, &start.to_vector());
         let drive: Vector6 = std::array::from_fn(|row| {
-            if free[row / 3] { (self.right[row] - momentum[row]) / dt } else { 0.0 }
+            if free[row] { (self.right[row] - momentum[row]) / dt } else { 0.0 }
         });
         let mut a = self.matrix;
         let least_mass = grain.mass() + added_density * grain.shape.volume();
         // The virtual mass returns its momentum in the next step.
         let virtual_mass = if added_density > 0.0 { self.virtual_mass.mass } else { 0.0 };
-        let mean_mass = (a[0][0] + a[1][1] + a[2][2]) / 3.0 - virtual_mass;
-        if free[0] {
-            for axis in 0..3 {
-                a[axis][axis] += (least_mass - mean_mass).max(0.0) - virtual_mass;
-            }
+        let moving = (0..3).filter(|axis| free[*axis]);
+        let mean_mass = moving.clone().map(|axis| a[axis][axis]).sum::<f64>()
+            / moving.clone().count() as f64
+            - virtual_mass;
+        for axis in moving {
+            a[axis][axis] += (least_mass - mean_mass).max(0.0) - virtual_mass;
         }
         let columns: [Vector6; 6] = std::array::from_fn(|n| {
             let mut unit = [0.0; 6];
-            unit[n] = if free[n / 3] { 1.0 } else { 0.0 };
+            unit[n] = if free[n] { 1.0 } else { 0.0 };
             solve6(a, unit).unwrap_or([0.0; 6])
         });
         let response = GrainResponse::new(start, drive, columns);
@@ -250,11 +251,6 @@ impl RigidBodySystem {
             response
         }
     }
-}
-
-/// Whether the translation and the rotation of a grain follow the equations of motion.
-fn free(grain: &Grain) -> [bool; 2] {
-    [grain.translation, grain.rotation].map(|constraint| constraint == MotionConstraint::Free)
 }
 
 /// Inertia of the fluid that a light grain accelerates with itself.
@@ -288,7 +284,8 @@ impl VirtualMass {
         let part = if in_free_surface { 1.0 } else { part };
         // Virtual mass over the mass of the grain.
         let part = part / density_ratio;
-        let [translation, rotation] = free(grain).map(|free| if free { part } else { 0.0 });
+        let [translation, rotation] = [grain.translation, grain.rotation]
+            .map(|constraint| if constraint == MotionConstraint::Free { part } else { 0.0 });
         let (mass, inertia) = (grain.mass() * translation, grain.inertia() * rotation);
         let PreviousStep { velocity, acceleration, change, .. } = previous;
         // The change, and not the acceleration times dt, keeps the momentum if the step varies, and

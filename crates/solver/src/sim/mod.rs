@@ -124,6 +124,8 @@ impl Simulation {
     pub fn new(mut setup: Setup) -> Result<Simulation, SetupError> {
         setup.validate()?;
         (setup.prescription).prescribe_motion(&mut setup.grains, 0.0);
+        let plane_normal = setup.flat_axis();
+        setup.grains.iter_mut().for_each(|grain| grain.plane_normal = plane_normal);
         let fluid = setup.fluid.map(|params| fluid::start(&mut setup, &params));
         let (clock, mut data) = (Clock::new(&setup), StepData::new(&setup));
         if let Some(fluid) = &fluid {

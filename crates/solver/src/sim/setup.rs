@@ -263,6 +263,16 @@ impl Setup {
                  become unstable below it; prescribe its velocity, or take a denser grain"
             ));
         }
+        if let Some(axis) = self.flat_axis()
+            && let Some(i) = self.grains.iter().position(|grain| grain.leaves_plane(axis))
+        {
+            let name = ["x", "y", "z"][axis];
+            return fail(format!(
+                "grain {i} starts out of the plane of the flow, which has one cell along {name}: \
+                 its velocity along {name} and its angular velocity about the other axes must be \
+                 0, or prescribed"
+            ));
+        }
         if sides().filter(|side| **side == Boundary::FreeSurface).count() > 1 {
             return fail("the box can have one free surface, not several".into());
         }
@@ -294,6 +304,11 @@ impl Setup {
             return fail("the time step must be positive and, without a fluid, finite".into());
         }
         Ok(())
+    }
+
+    /// Axis along which the flow has one cell, if any. Free grains move in the plane normal to it.
+    pub fn flat_axis(&self) -> Option<usize> {
+        (0..3).find(|axis| self.fluid.is_some() && !self.mesh.is_resolved(*axis))
     }
 
     /// Index of the first free grain that is too light for the coupling.

@@ -575,3 +575,24 @@ fn an_ellipsoid_rolls_down_a_slight_slope() {
         assert!((ratio - 1.0).abs() < 0.015, "{degrees}: {ratio}");
     }
 }
+
+/// Rotation about a fixed direction that is no principal axis: I_nn domega/dt = T_n.
+#[test]
+fn a_grain_that_keeps_to_a_plane_turns_about_its_normal_only() {
+    let mut block = Grain::new(BLOCK.clone(), 2500.0)
+        .with_orientation(DQuat::from_scaled_axis(DVec3::new(0.4, -0.9, 0.3)));
+    block.plane_normal = Some(1);
+    let moment = block.inertia().y_axis.y;
+    assert!(block.inertia().y_axis.x.abs() > 0.05 * moment, "the normal is no principal axis");
+    let load = Load { force: DVec3::new(1e-3, 5e-3, -2e-3), torque: DVec3::new(3e-5, 2e-5, 4e-5) };
+    let mut dynamics = ContactDynamics::new(ContactParams::default(), open_box(1.0));
+    let (mass, mut grains) = (block.mass(), [block]);
+    for _ in 0..100 {
+        dynamics.advance(&mut grains, &[load], 1e-3, &mut [Load::default()]);
+    }
+    let [Grain { pose, velocity, angular_velocity: omega, .. }] = &grains;
+    assert!((velocity - 0.1 * DVec3::new(1e-3, 0.0, -2e-3) / mass).length() < 1e-12, "{velocity}");
+    assert_eq!((pose.position.y, omega.x, omega.z), (0.0, 0.0, 0.0));
+    // The moment about the normal does not change as the grain turns about it.
+    assert!((omega.y * moment / (0.1 * load.torque.y) - 1.0).abs() < 1e-12, "{omega}");
+}

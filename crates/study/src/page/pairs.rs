@@ -37,14 +37,15 @@ pub(super) fn summary(content: &Content) -> Markup {
     let kiss = observations(content.records, "kiss_time", &all);
     let contact = observations(content.records, "contact_stage", &all);
     html! {
-        (extremes("first contact", &kiss))
-        (extremes("time in contact until separation", &contact))
+        (extremes("first contact", &kiss, content.plan.has_members()))
+        (extremes("time in contact until separation", &contact, content.plan.has_members()))
         (paragraph("Uncertainty", &uncertainty(content, &kiss, &contact)))
     }
 }
 
-/// Returns the five shortest and the three longest times, censored ones left out.
-fn extremes(what: &str, all: &[Observation]) -> Markup {
+/// Returns the five shortest and the three longest times, censored ones left out; `several` if
+/// models have several runs.
+fn extremes(what: &str, all: &[Observation], several: bool) -> Markup {
     let mut sorted: Vec<&Observation> = all.iter().filter(|o| !o.censored).collect();
     sorted.sort_by(|a, b| a.value.total_cmp(&b.value));
     let censored = all.len() - sorted.len();
@@ -58,7 +59,7 @@ fn extremes(what: &str, all: &[Observation]) -> Markup {
             } @else {
                 b { "Shortest " (what) ", by model" } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."
-                @if censored > 0 { " " (missed(censored)) " no such time." }
+                @if censored > 0 { " " (missed(censored, several)) " no such time." }
             }
         }
     }

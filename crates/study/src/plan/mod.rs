@@ -147,6 +147,11 @@ impl Plan {
         Plan { grainwake_study: 1, study, title, version, commit, accepted, analysis, runs }
     }
 
+    /// Returns whether a model has more than one run.
+    pub fn has_members(&self) -> bool {
+        self.runs.iter().any(|run| run.member > 0)
+    }
+
     /// Returns the plan with commits of other programs whose finished runs count.
     ///
     /// # Errors

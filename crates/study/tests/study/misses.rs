@@ -77,7 +77,10 @@ fn a_landing_is_no_kissing_time() {
     let joined = drawn.lines().filter(|l| l.contains("#b4b4b8") && l.contains('L'));
     assert_eq!(joined.count(), 1, "{drawn}");
     let page = std::fs::read_to_string(&rendered.page).unwrap();
-    assert!(page.contains("3 models, whose pairs landed or whose runs ended before, have no time"));
+    let missed =
+        "3 models, in half or more of whose runs the pair landed or the run ended before, have no";
+    assert!(page.contains(missed), "{page}");
+    assert!(drawn.contains("no kiss in half of the runs or more"), "the legend of hollow symbols");
     assert!(page.contains("runs in which the pair kissed before landing: 8,"), "{page}");
     assert!(!page.contains("right-censored"));
 }

@@ -82,6 +82,26 @@ impl Placement {
     }
 }
 
+/// Reports free grains that start out of the plane of a flow that has one cell along `normal`.
+pub(super) fn check_plane(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    normal: usize,
+) {
+    let name = AXES[normal];
+    let leaving = grains.iter().zip(placements).enumerate();
+    for (i, (_, at)) in leaving.filter(|(_, (grain, _))| grain.leaves_plane(normal)).take(LISTED) {
+        let message = format!(
+            "grain {i} starts out of the plane of the flow, which has one cell along {name}"
+        );
+        let help = format!(
+            "accepted: no velocity along {name}, and no angular velocity about the other axes; or prescribe them with motion"
+        );
+        check.fail(&at.span, message, help);
+    }
+}
+
 /// Reports grains that cross a side of the box other than a free surface. Overlaps with a wall up
 /// to `accepted` diameters are contacts.
 pub(super) fn check_faces(

@@ -115,6 +115,9 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
         arrangement::check_faces(check, &grains, &placements, &enclosure, &boundaries, accepted);
         overlaps::check_overlaps(check, &grains, &placements, &enclosure, accepted);
     }
+    if let Some(normal) = (0..3).find(|axis| !dry && !mesh.is_resolved(*axis)) {
+        arrangement::check_plane(check, &grains, &placements, normal);
+    }
     if dry && grains.is_empty() {
         let message = "there is neither a fluid nor a grain";
         check.fail_key("grain", message, "add [fluid] or [[grain]]");

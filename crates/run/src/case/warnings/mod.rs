@@ -209,14 +209,13 @@ fn prescribed_motions(setup: &Setup, end: f64) -> Vec<String> {
 
 /// Grains in a box that is one cell thick: free ones, and those away from its middle.
 fn flat_box(setup: &Setup) -> Vec<String> {
-    let flat = (0..3).find(|axis| setup.mesh.cells[*axis] == 1);
-    let Some(axis) = flat.filter(|_| setup.fluid.is_some()) else { return Vec::new() };
+    let Some(axis) = setup.flat_axis() else { return Vec::new() };
     let (mesh, name) = (&setup.mesh, AXES[axis]);
     let depth = mesh.extent()[axis];
     let mut found = Vec::new();
     if setup.grains.iter().any(is_free) {
         found.push(format!(
-            "the box is one cell thick along {name}: the flow sees a grain as a body of the whole depth, {}, but its weight and inertia are those of its own shape; make it nearly as deep",
+            "the box is one cell thick along {name}: grains move in its plane only, and the flow sees a grain as a body of the whole depth, {}, but its weight and inertia are those of its own shape; make it nearly as deep",
             quantity(depth, "m")
         ));
     }

@@ -185,8 +185,11 @@ impl GrainResponse {
         sum
     }
 
-    /// Inverse of the mass against a force, averaged over directions [1/kg].
+    /// Inverse of the mass against a force, averaged over the directions in which the grain moves
+    /// [1/kg].
     pub(super) fn inverse_mass(&self) -> f64 {
-        (self.inverse[0][0] + self.inverse[1][1] + self.inverse[2][2]) / 3.0
+        let all = [0, 1, 2].map(|n| self.inverse[n][n]);
+        let free = all.iter().filter(|inverse| **inverse != 0.0).count();
+        (all[0] + all[1] + all[2]) / free.max(1) as f64
     }
 }

@@ -23,13 +23,23 @@ impl ContactBody {
         }
     }
 
+    /// Angular acceleration under `load` [rad/s^2, space frame]; none if Euler's equations in the
+    /// body frame give it.
+    fn angular_acceleration(&self, grain: &Grain, load: &Load) -> Option<DVec3> {
+        match (&self.response, grain.plane_normal) {
+            (Some(response), _) => Some(response.acceleration(load)[1]),
+            (None, Some(_)) => Some(grain.angular_response(load.torque)),
+            (None, None) => None,
+        }
+    }
+
     /// First half step of the body's grain: velocities to n+1/2 and pose to n+1.
     pub fn first_half_step(&mut self, grain: &mut Grain, damping: f64, step: f64) {
         let (load, half) = (self.load + self.contact, 0.5 * step);
         let start = grain.rigid_velocity();
         let (mut middle, mut end) = (start, start);
         if grain.translation == MotionConstraint::Free {
-            let change = half * (self.acceleration(&load) - damping * start.linear);
+            let change = half * (grain.in_plane(self.acceleration(&load)) - damping * start.linear);
             middle.linear = start.linear + change;
             end.linear = middle.linear + change;
         }
@@ -37,14 +47,12 @@ impl ContactBody {
         if grain.rotation == MotionConstraint::Free {
             let to_body = grain.pose.orientation.conjugate();
             let omega = to_body * start.angular;
-            let omega_mid = match &self.response {
+            let omega_mid = match self.angular_acceleration(grain, &load) {
                 None => {
                     let torque = to_body * load.torque;
                     half_step_explicit(grain.principal_inertia(), omega, torque, damping, half)
                 }
-                Some(response) => {
-                    omega + half * (to_body * response.acceleration(&load)[1] - damping * omega)
-                }
+                Some(angular) => omega + half * (to_body * angular - damping * omega),
             };
             grain.pose.orientation = rotate_by_cayley(grain.pose.orientation, omega_mid, step);
             // The rotation axis is omega_mid, so its space components do not change.
@@ -61,10 +69,11 @@ impl ContactBody {
         let (load, half, middle) = (self.load + self.contact, 0.5 * step, self.velocity.middle);
         let damping_factor = 1.0 + damping * half;
         if grain.translation == MotionConstraint::Free {
-            grain.velocity = (middle.linear + half * self.acceleration(&load)) / damping_factor;
+            let change = half * grain.in_plane(self.acceleration(&load));
+            grain.velocity = (middle.linear + change) / damping_factor;
         }
         if grain.rotation == MotionConstraint::Free {
-            grain.angular_velocity = match &self.response {
+            grain.angular_velocity = match self.angular_acceleration(grain, &load) {
                 None => {
                     let to_body = grain.pose.orientation.conjugate();
                     let (omega, torque) = (to_body * middle.angular, to_body * load.torque);
@@ -72,9 +81,7 @@ impl ContactBody {
                     let omega = half_step_implicit(inertia, omega, torque, damping, half);
                     grain.pose.orientation * omega
                 }
-                Some(response) => {
-                    (middle.angular + half * response.acceleration(&load)[1]) / damping_factor
-                }
+                Some(angular) => (middle.angular + half * angular) / damping_factor,
             };
         }
     }

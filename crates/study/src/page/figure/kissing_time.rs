@@ -148,9 +148,9 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
     };
     let entry = |name: &String| symbol_entry(name, style(Some(name)));
     let mut entries: Vec<Entry> = levels.iter().map(entry).collect();
-    let censored = layout.censored();
+    let (censored, several) = (layout.censored(), data.plan.has_members());
     if censored > 0 {
-        entries.push(misses::entry());
+        entries.push(misses::entry(several));
     }
     let legend = Legend::new(entries, PAGE - LEFT);
     layout.frame.y += legend.height() + 10.5 - TOP;
@@ -192,7 +192,8 @@ pub fn by_model(data: &FigureData) -> Option<Figure> {
         ),
     };
     if censored > 0 {
-        caption += &format!(" Hollow, above the axis: {} no kissing time.", missed(censored));
+        caption +=
+            &format!(" Hollow, above the axis: {} no kissing time.", missed(censored, several));
     }
     let title = "Kissing time of all models";
     Some(Figure::new("fig14a-kissing-time", title, caption, drawing).numbered("14a"))
@@ -246,8 +247,12 @@ pub fn box_plot(data: &FigureData) -> Option<Figure> {
     );
     let censored = layout.censored();
     if censored > 0 {
+        let what = match data.plan.has_members() {
+            true => "in which half or more of the runs have no kiss",
+            false => "without a kiss",
+        };
         caption += &format!(
-            " Numbers above the axis: orientations of the grain without a kiss, {censored} in all; \
+            " Numbers above the axis: orientations of the grain {what}, {censored} in all; \
              their pairs landed, or their runs ended, before."
         );
     }

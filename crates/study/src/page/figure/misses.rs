@@ -58,8 +58,11 @@ pub(super) fn number(drawing: &mut Drawing, frame: &Frame, x: f64, count: usize)
     }
 }
 
-/// Hollow symbol of a model without the event, for a legend.
-pub(super) fn entry() -> Entry {
-    let name = "hollow: landed, or run ended, before kissing";
+/// Hollow symbol of a model without the event, for a legend; `several` if models have several runs.
+pub(super) fn entry(several: bool) -> Entry {
+    let name = match several {
+        true => "hollow: no kiss in half of the runs or more; bars: range of the kisses",
+        false => "hollow: landed, or run ended, before kissing",
+    };
     Entry::symbol(name, INK, Marker::Circle, Fill::Hollow)
 }

@@ -196,7 +196,8 @@ pub(super) fn against_parameters(
     if all.len() < models {
         caption += &format!(" {} of {models} models have a value.", all.len());
     }
-    if data.plan.runs.iter().any(|r| r.member > 0) {
+    let several = data.plan.has_members();
+    if several {
         caption += match is_time(quantity) {
             true => {
                 " Symbols are medians over an ensemble, runs without the event last; bars are the \
@@ -206,7 +207,7 @@ pub(super) fn against_parameters(
         };
     }
     if misses > 0 {
-        caption += &format!(" Hollow symbols above the axis: {} no time.", missed(misses));
+        caption += &format!(" Hollow symbols above the axis: {} no time.", missed(misses, several));
     }
     if left_out > 0 {
         caption += &format!(" {left_out} more axes or factors are not shown.");
