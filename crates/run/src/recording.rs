@@ -166,6 +166,9 @@ fn begin(
     note: &mut dyn FnMut(&str),
 ) -> Result<Begin, RunError> {
     if let Some(record) = own {
+        if record.steps == record.first_step {
+            sim.limit_next_step();
+        }
         let (time, steps) = (record.time, record.steps);
         note(&format!("resuming at t = {}, step {steps}", quantity(time, "s")));
         return Ok(Begin::Resumed(Box::new(record)));
@@ -177,6 +180,7 @@ fn begin(
         return Ok(Begin::Fresh);
     };
     let record = parent.restore(sim)?;
+    sim.limit_next_step();
     let (folder, time, steps) = (parent.folder().display(), record.time, record.steps);
     note(&format!("starting from {folder} at t = {}, step {steps}", quantity(time, "s")));
     Ok(Begin::Branched(Box::new(record)))

@@ -234,6 +234,24 @@ fn a_very_short_step_is_forgotten() {
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
 }
 
+/// The first step is limited by gravity, from rest; one after a restored state is not.
+#[test]
+fn a_restored_simulation_takes_the_same_next_step() {
+    let limits = StepRule::Limits { cfl: 0.4, viscous: 1e9, max_step: f64::INFINITY };
+    let mut setup = setup().with_step(limits);
+    setup.grains.iter_mut().for_each(|grain| *grain = grain.clone().held());
+    let [mut sim, mut again] = [(); 2].map(|()| Simulation::new(setup.clone()).unwrap());
+    advance(&mut sim, 5);
+    let mut state = Vec::new();
+    sim.save(&mut state).unwrap();
+    again.restore(&mut &state[..]).unwrap();
+    let first = Simulation::new(setup).map(|mut sim| (advance(&mut sim, 1), sim.time_step()));
+    advance(&mut sim, 1);
+    advance(&mut again, 1);
+    assert!(sim.time_step() > 1.5 * first.unwrap().1, "the state is at rest");
+    assert_eq!(sim.time_step(), again.time_step());
+}
+
 /// The fluid does not yet have the velocity that was set, so its CFL number does not limit the next
 /// step.
 #[test]

@@ -899,6 +899,31 @@ fn a_sampled_grain_in_a_flat_box_is_held_and_takes_little_memory() {
     assert!(drag.x > 0.0 && drag.y.abs() < 1e-3 * drag.x, "{drag}");
 }
 
+/// A heavy ellipsoid that tumbles loses angular momentum by the fluid's drag only, and as much with
+/// any step. With the gyroscopic torque at the start of a step it gained 12 % in the time in which
+/// it should lose 2 %.
+#[test]
+fn a_tumbling_grain_keeps_its_angular_momentum() {
+    let kept = [0.4, 0.1].map(|cfl| {
+        let body = ellipsoid(0.75, 0.5, 0.375, &ShapeOptions::default()).unwrap();
+        let mut grain = Grain::new(Arc::new(body), 1e4).with_position(DVec3::splat(1.5));
+        grain.angular_velocity = DVec3::new(0.3, 0.6, 0.4);
+        let start = [grain.angular_momentum(grain.pose.position).length(), grain.kinetic_energy()];
+        let case = setup([12; 3], 0.25, [PERIODIC; 3], 0.01, vec![grain]).with_step(limits(cfl));
+        let mut sim = Simulation::new(case).unwrap();
+        run(&mut sim, 30.0);
+        let grain = &sim.grains()[0];
+        let end = [grain.angular_momentum(grain.pose.position).length(), grain.kinetic_energy()];
+        println!("cfl {cfl}: {} steps, L and E {end:?} of {start:?}", sim.steps());
+        [end[0] / start[0], end[1] / start[1]]
+    });
+    for [momentum, energy] in kept {
+        assert!(momentum < 1.0 && energy < 1.0, "{kept:?}");
+        assert!(momentum > 0.99, "{kept:?}");
+    }
+    assert!((kept[0][0] - kept[1][0]).abs() < 1e-4, "{kept:?}");
+}
+
 /// A free cylinder across a box of one cell, tilted out of the plane of the flow and shorter than
 /// the box. Free to leave the plane, it was driven out of it within 4 time units by a disturbance
 /// that began at round-off.

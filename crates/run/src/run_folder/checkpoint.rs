@@ -53,6 +53,9 @@ pub struct Record {
     /// VTK files written.
     #[serde(rename = "pictures")]
     pub vtk_files: Vec<Entry>,
+    /// Step with which the run began: 0, or that of the parent.
+    #[serde(default)]
+    pub first_step: u64,
     /// Largest |div u| so far [1/s].
     pub max_divergence: f64,
     /// Largest CFL number so far.
@@ -88,6 +91,7 @@ impl Record {
             lengths: Lengths::default(),
             next: Vec::new(),
             vtk_files: Vec::new(),
+            first_step: sim.steps(),
             max_divergence: sim.max_divergence(),
             max_cfl: 0.0,
             overlaps: Overlaps::default(),

@@ -127,6 +127,10 @@ impl Grain {
         }
         vector
     }
+    /// An angular velocity less the components about axes in the plane of motion.
+    pub(super) fn spin_in_plane(&self, omega: DVec3) -> DVec3 {
+        self.plane_normal.map_or(omega, |normal| omega[normal] * DVec3::AXES[normal])
+    }
     /// Mass [kg].
     pub fn mass(&self) -> f64 {
         self.density * self.shape.volume()

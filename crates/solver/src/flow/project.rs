@@ -49,7 +49,7 @@ pub struct FacePlanes<'a, R> {
     pub layout: Layout,
     /// Whether each axis is periodic.
     pub periodic: [bool; 3],
-    /// 1/h along each axis [1/m].
+    /// 1/h along each axis [1/m]; zero along an axis of one cell, along which nothing changes.
     pub inverse: [f64; 3],
     /// Lower faces of the cells along each axis.
     lower: [&'a [R]; 3],
@@ -70,7 +70,8 @@ impl<'a, R: Real> FacePlanes<'a, R> {
         FacePlanes {
             layout,
             periodic,
-            inverse: mesh.spacing.to_array().map(|h| 1.0 / h),
+            inverse: [0, 1, 2]
+                .map(|a| if mesh.is_resolved(a) { 1.0 / mesh.spacing[a] } else { 0.0 }),
             lower: [layout.plane_of(x, k), layout.plane_of(y, k), layout.plane_of(z, k)],
             above: layout.plane_of(z, next(k, layout.cells[2], periodic[2])),
         }

@@ -23,6 +23,8 @@ use crate::math::{Load, Matrix6, RigidVelocity, Vector6, multiply6, solve6};
 pub struct PreviousStep {
     /// Velocities at the end of the previous step, which the forced faces have.
     pub velocity: RigidVelocity,
+    /// Inertia tensor at the start of the step [kg m^2, space frame].
+    pub inertia: DMat3,
     /// Change of the velocities between the steps, by control of the grain. The grain has its
     /// momentum, the displaced fluid does not.
     pub set_change: RigidVelocity,
@@ -41,6 +43,12 @@ pub struct PreviousStep {
 }
 
 impl PreviousStep {
+    /// State before the first step of a grain.
+    pub fn of(grain: &Grain) -> PreviousStep {
+        let (velocity, inertia) = (grain.rigid_velocity(), grain.inertia());
+        PreviousStep { velocity, inertia, ..Default::default() }
+    }
+
     /// Velocities at the start of the step.
     pub fn start_velocity(&self) -> RigidVelocity {
         // Adding zero would turn -0.0 into 0.0.
@@ -73,11 +81,50 @@ pub struct RigidBodySystem {
     right: Vector6,
     virtual_mass: VirtualMass,
     impulse: Impulse,
-    /// Inertia of fluid that a part of the grain beyond a free surface does not displace, and load
-    /// of the pressure at this surface.
-    surface: Option<(Matrix6, Load)>,
+    surface: Option<EmergedLoads>,
     /// Load of a grain that leaves the box.
     last_load: Option<Load>,
+}
+
+/// Effects of the part of a grain beyond a free surface.
+#[derive(Clone, Copy, Debug)]
+struct EmergedLoads {
+    /// Inertia of the fluid that this part does not displace.
+    inertia: Matrix6,
+    /// Rate of change of the momentum of this fluid at constant velocities, by its rotation.
+    turning: Load,
+    /// Load of the pressure at the surface.
+    pressure: Load,
+}
+
+impl EmergedLoads {
+    fn new(
+        part: &EmergedPart,
+        pressure: Load,
+        previous: &PreviousStep,
+        fluid_density: f64,
+        dt: f64,
+    ) -> EmergedLoads {
+        let inertia = part.inertia.map(|row| row.map(|entry| fluid_density * entry));
+        // Velocity at the middle of the step.
+        let omega = previous.start_velocity().angular + 0.5 * dt * previous.acceleration.angular;
+        let row = |n: usize| DVec3::from_slice(&inertia[n][3..]).dot(omega);
+        let turning = Load {
+            force: fluid_density * omega.cross(omega.cross(part.moment)),
+            torque: omega.cross(DVec3::new(row(3), row(4), row(5))),
+        };
+        EmergedLoads { inertia, turning, pressure }
+    }
+
+    /// Change of the momentum of this fluid if the velocities change by `change` in `dt` [s].
+    fn momentum(&self, change: RigidVelocity, dt: f64) -> Vector6 {
+        let mut momentum = multiply6(&self.inertia, &change.to_vector());
+        let turning = [self.turning.force, self.turning.torque];
+        for (n, momentum) in momentum.iter_mut().enumerate() {
+            *momentum += dt * turning[n / 3][n % 3];
+        }
+        momentum
+    }
 }
 
 impl RigidBodySystem {
@@ -108,22 +155,21 @@ impl RigidBodySystem {
         surface: Option<(&EmergedPart, Load)>,
         dt: f64,
     ) -> RigidBodySystem {
-        let surface = surface.map(|(part, load)| {
-            (part.inertia.map(|row| row.map(|entry| fluid_density * entry)), load)
-        });
-        let applied = surface.map_or(applied, |(_, load)| applied + load);
+        let surface =
+            surface.map(|(part, load)| EmergedLoads::new(part, load, previous, fluid_density, dt));
+        let applied = surface.map_or(applied, |surface| applied + surface.pressure);
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);
-        let (old, omega) = (previous.velocity, previous.start_velocity().angular);
-        let gyroscopic = omega.cross(inertia * omega);
+        let old = previous.velocity;
         let virtual_mass = VirtualMass::new(grain, previous, fluid_density, surface.is_some(), dt);
         let mut linear = mass * old.linear + dt * applied.force + virtual_mass.momentum[0];
-        let torque = applied.torque - gyroscopic;
-        let mut angular = inertia * old.angular + dt * torque + virtual_mass.momentum[1];
+        // With the inertia at the start: Euler's equation for the angular momentum.
+        let start = previous.inertia * excess * old.angular;
+        let mut angular = start + dt * applied.torque + virtual_mass.momentum[1];
         if previous.was_set() {
             linear += grain.mass() * previous.set_change.linear;
-            angular += grain.inertia() * previous.set_change.angular;
+            angular += previous.inertia * previous.set_change.angular;
         }
         let (mut a, mut b) = (impulse.matrix, [0.0; 6]);
         for row in 0..3 {
@@ -134,12 +180,12 @@ impl RigidBodySystem {
                 a[3 + row][3 + column] += (inertia + virtual_mass.inertia).col(column)[row];
             }
         }
-        if let Some((not_displaced, _)) = surface {
-            let momentum = multiply6(&not_displaced, &previous.velocity.to_vector());
+        if let Some(surface) = &surface {
+            let momentum = surface.momentum(RigidVelocity::default() - previous.velocity, dt);
             for row in 0..6 {
-                b[row] += momentum[row];
+                b[row] -= momentum[row];
                 for column in 0..6 {
-                    a[row][column] += not_displaced[row][column];
+                    a[row][column] += surface.inertia[row][column];
                 }
             }
         }
@@ -184,22 +230,20 @@ impl RigidBodySystem {
         let new = grain.rigid_velocity();
         let mut j = self.impulse.at(new);
         let change = new - previous.velocity;
-        if let Some((not_displaced, _)) = &self.surface {
-            let momentum = multiply6(not_displaced, &change.to_vector());
+        if let Some(surface) = &self.surface {
+            let momentum = surface.momentum(change, dt);
             j.iter_mut().zip(momentum).for_each(|(j, momentum)| *j += momentum);
         }
         let VirtualMass { mass, inertia, momentum } = self.virtual_mass;
         let force = DVec3::from_slice(&j[..3]) + mass * new.linear - momentum[0];
         let torque = DVec3::from_slice(&j[3..]) + inertia * new.angular - momentum[1];
-        let omega = previous.start_velocity().angular;
         let displaced = fluid_density / grain.density;
-        let fluid_inertia = grain.inertia() * displaced;
+        let spin = grain.inertia() * new.angular - previous.inertia * previous.velocity.angular;
         let load = Load {
             force: (displaced * grain.mass() * change.linear - force) / dt,
-            torque: (fluid_inertia * change.angular - torque) / dt
-                + omega.cross(fluid_inertia * omega),
+            torque: (displaced * spin - torque) / dt,
         };
-        self.surface.map_or(load, |(_, of_surface)| load + of_surface)
+        self.surface.map_or(load, |surface| load + surface.pressure)
     }
 
     /// Impulse on the fluid [N s] of the grain, which has its new velocities.

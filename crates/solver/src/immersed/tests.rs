@@ -3,6 +3,8 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
+use super::emerged::{EmergedPart, Subvolumes};
+use super::rigid_body::RigidBodySystem;
 use super::*;
 use crate::dem::{Grain, RigidState};
 use crate::flow::{Boundaries, Boundary, Flow, FluidParams, NestedFlow};
@@ -47,9 +49,7 @@ fn step<R: Real>(scheme: Scheme, first: [Load; 2], resolved: [Load; 2]) -> (Vec<
     let mut nested = NestedFlow::new(flow, &params);
     immersed.initialise(&mut nested, &mut grains, Start::Impulsive);
     let mut flow = nested.whole;
-    let previous = grains
-        .each_ref()
-        .map(|grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() });
+    let previous = grains.each_ref().map(PreviousStep::of);
     let kinematics = grains.each_ref().map(RigidState::of);
     flow.predict(DT);
     for grain in &mut grains {
@@ -261,5 +261,34 @@ fn grains_that_use_the_same_faces_are_never_isolated() {
             let (isolated, conflict) = check(reaches);
             assert!(!(isolated && conflict), "{scheme:?} {reaches}");
         }
+    }
+}
+
+/// A grain that is wholly beyond a free surface feels no fluid: its angular momentum is constant.
+#[test]
+fn a_grain_in_air_keeps_its_angular_momentum() {
+    let shape = Arc::new(analytic::ellipsoid(0.5, 0.4, 0.3, &ShapeOptions::default()).unwrap());
+    let dt = 0.01;
+    for density in [1.5, 0.9] {
+        let mut grain = Grain::new(shape.clone(), density)
+            .with_orientation(DQuat::from_scaled_axis(DVec3::new(0.3, -0.2, 0.9)))
+            .with_angular_velocity(DVec3::new(3.0, 6.0, -4.0));
+        let (omega, inertia) = (grain.angular_velocity, grain.inertia());
+        let gyroscopic = omega.cross(inertia * omega);
+        let mut previous = PreviousStep::of(&grain);
+        previous.acceleration.angular = inertia.inverse() * -gyroscopic;
+        let [middle, end] =
+            [0.5 * dt, dt].map(|time| grain.rigid_velocity().advance(grain.pose, time));
+        grain.pose = end;
+        let part = EmergedPart::new(&Subvolumes::of(&shape), middle, (2, 1.0), -9.0, 0.1);
+        let (none, surface) = (Load::default(), Some((&part, Load::default())));
+        let impulse = rigidity::Impulse::default();
+        let system = RigidBodySystem::new(&grain, &previous, impulse, 1.0, none, surface, dt);
+        let new = system.velocities(&grain, &previous, none, dt);
+        let change = grain.inertia() * new.angular - inertia * omega;
+        assert!(change.length() < 0.05 * dt * gyroscopic.length(), "{density}: {change}");
+        grain.angular_velocity = new.angular;
+        let load = system.hydrodynamic_load(&grain, &previous, 1.0, dt);
+        assert!(load.torque.length() < 0.05 * gyroscopic.length(), "{density}: {load:?}");
     }
 }

@@ -19,6 +19,8 @@ pub(super) struct Clock {
     /// Longest next step [s]: from rest, gravity, the body acceleration or a load that was set
     /// moves nothing by more than `cfl` cells in it.
     pub longest_next: f64,
+    /// `longest_next` of the first step [s].
+    longest_first: f64,
 }
 
 /// Largest ratio of successive steps within limits, since Adams-Bashforth extrapolates over the
@@ -47,6 +49,7 @@ impl Clock {
             .chain(setup.fluid.map(|fluid| fluid.body_acceleration.length()))
             .chain(setup.prescription.body_acceleration(0.0).map(DVec3::length))
             .fold(0.0, f64::max);
+        let longest_first = setup.longest_step_from_rest(acceleration);
         Clock {
             time: 0.0,
             steps: 0,
@@ -55,7 +58,8 @@ impl Clock {
             viscous_rate: setup
                 .fluid
                 .map_or(0.0, |fluid| fluid.kinematic_viscosity * inverse_squares),
-            longest_next: setup.longest_step_from_rest(acceleration),
+            longest_next: longest_first,
+            longest_first,
         }
     }
 
@@ -89,6 +93,17 @@ impl Clock {
         if (step - self.last_step).abs() <= ROUNDING * step { self.last_step } else { step }
     }
 
+    /// Limits the next step as the first one.
+    pub fn limit_next_step(&mut self) {
+        self.longest_next = self.longest_first;
+    }
+
+    /// Takes a stored state: only the first step is limited from rest.
+    pub fn restore(&mut self, steps: u64, [time, last_step]: [f64; 2]) {
+        let longest_next = if steps == 0 { self.longest_first } else { f64::INFINITY };
+        *self = Clock { steps, time, last_step, longest_next, ..*self };
+    }
+
     /// Advances the time by `step` [s], exactly to the `horizon` [s] if the step ends there.
     pub fn advance(&mut self, step: f64, horizon: f64) {
         let ends = (step - horizon).abs() <= ROUNDING * step;
@@ -120,6 +135,7 @@ mod tests {
             },
             viscous_rate: 1.0,
             longest_next: f64::INFINITY,
+            longest_first: f64::INFINITY,
         };
         let mut steps = Vec::new();
         while clock.time < 1.0 - 1e-9 {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::Simulation;
+use crate::math::RigidVelocity;
 
 /// Measures of the state at the end of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,7 +21,7 @@ pub struct Diagnostics {
     /// Kinetic energy of the fluid in the box [J], the fluid inside grains included: the sum over
     /// the lower faces of all cells.
     pub fluid_kinetic_energy: f64,
-    /// Kinetic energy of the grains [J].
+    /// Kinetic energy of the grains with [`Simulation::grain_velocity`] [J].
     pub grain_kinetic_energy: f64,
     /// Momentum of the box [kg m/s]: fluid at all faces but those of the sides that are not
     /// periodic, plus that of the grains beyond the displaced fluid.
@@ -41,10 +42,9 @@ impl Simulation {
         let mut d = Diagnostics::default();
         let fluid_density = self.setup.fluid.map_or(0.0, |fluid| fluid.density);
         for (index, grain) in grains.iter().enumerate() {
-            let spin = grain.angular_velocity;
-            d.grain_kinetic_energy += 0.5
-                * (grain.mass() * grain.velocity.length_squared()
-                    + spin.dot(grain.inertia() * spin));
+            let RigidVelocity { linear, angular: spin } = self.grain_velocity(index);
+            d.grain_kinetic_energy +=
+                0.5 * (grain.mass() * linear.length_squared() + spin.dot(grain.inertia() * spin));
             d.momentum += (grain.density - fluid_density) * grain.shape.volume() * grain.velocity;
             if let Some(open_sides) = &self.data.open_sides {
                 d.momentum += open_sides.emerged_momentum(index, grain, fluid_density);
@@ -69,11 +69,13 @@ impl Simulation {
     /// in the box [m/s].
     fn slip(&self) -> f64 {
         let (mut sum, mut area) = (0.0, 0.0);
-        for grain in &self.setup.grains {
+        for (index, grain) in self.setup.grains.iter().enumerate() {
+            let velocity = self.grain_velocity(index);
             for node in grain.shape.nodes() {
                 let x = grain.pose.to_space(node.position);
                 if let Some(u) = self.interpolate_velocity(x) {
-                    sum += node.area * (u - grain.velocity_at(x)).length_squared();
+                    let relative = u - velocity.at(x - grain.pose.position);
+                    sum += node.area * relative.length_squared();
                     area += node.area;
                 }
             }

@@ -92,15 +92,13 @@ impl StepData {
         // With fluid the equations of the grains contain the damping (`Start::prepare`).
         let in_substeps = if setup.fluid.is_some() { 0.0 } else { setup.contact.global_damping };
         let contact = ContactParams { global_damping: in_substeps, ..setup.contact };
-        let at_start =
-            |grain: &Grain| PreviousStep { velocity: grain.rigid_velocity(), ..Default::default() };
         StepData {
             dynamics: ContactDynamics::new(contact, setup.enclosure()),
             open_sides: OpenSides::new(&setup.mesh, &setup.boundaries, grains),
             times: PassTimes::default(),
             momentum_residual: DVec3::ZERO,
             loads: vec![Load::default(); count],
-            previous: grains.iter().map(at_start).collect(),
+            previous: grains.iter().map(PreviousStep::of).collect(),
             kinematics: grains.iter().map(RigidState::of).collect(),
             external: vec![Load::default(); count],
             applied: vec![Load::default(); count],
@@ -132,6 +130,11 @@ impl Simulation {
             data.times.initial = fluid.poisson_times();
         }
         Ok(Simulation { setup, clock, fluid, data })
+    }
+    /// Limits the length of the next step as that of the first one, for a run that begins with the
+    /// state of another, whose gravity may differ.
+    pub fn limit_next_step(&mut self) {
+        self.clock.limit_next_step();
     }
     /// Simulated time [s].
     pub fn time(&self) -> f64 {

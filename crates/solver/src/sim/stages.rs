@@ -83,6 +83,7 @@ impl<'a> Start<'a> {
                 data.applied[i] += damping_load(grain, setup.contact.global_damping, dt);
             }
             let previous = &mut data.previous[i];
+            previous.inertia = grain.inertia();
             previous.set_change = grain.rigid_velocity() - previous.velocity;
             data.kinematics[i] = RigidState { pose: grain.pose, velocity: previous.velocity };
         }

@@ -55,8 +55,8 @@ impl Simulation {
     /// of the reader.
     pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
         let mut input = Decoder::new(reader);
-        self.clock.steps = input.u64()?;
-        [self.clock.time, self.clock.last_step] = input.numbers()?;
+        let steps = input.u64()?;
+        self.clock.restore(steps, input.numbers()?);
         input.expect(self.setup.grains.len(), "grains")?;
         let grains = self.setup.grains.iter_mut();
         let data = &mut self.data;

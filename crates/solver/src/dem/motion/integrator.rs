@@ -56,7 +56,7 @@ impl ContactBody {
             };
             grain.pose.orientation = rotate_by_cayley(grain.pose.orientation, omega_mid, step);
             // The rotation axis is omega_mid, so its space components do not change.
-            middle.angular = grain.pose.orientation * omega_mid;
+            middle.angular = grain.spin_in_plane(grain.pose.orientation * omega_mid);
             end.angular = 2.0 * middle.angular - start.angular;
         } else {
             grain.pose.orientation = rotate_exactly(grain.pose.orientation, start.angular, step);

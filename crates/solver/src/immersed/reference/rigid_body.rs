@@ -14,8 +14,9 @@ impl Reference {
     /// the previous velocities to `new`, under the `load` of weight, buoyancy and contact:
     ///
     /// (m - m_f)(V - V_old) - m dV + m_v (V - V_old - previous change) + J - dt F = 0 with the
-    /// change dV that was set between the steps, and the same with I, Omega, the previous
-    /// acceleration times dt, and the gyroscopic torque Omega_start x (I - I_f) Omega_start.
+    /// change dV that was set between the steps. The same with I, Omega and the previous acceleration
+    /// times dt; I has the orientation at the start of the step where it multiplies Omega_old or
+    /// dOmega, and that at its end elsewhere.
     pub fn momentum_residual(
         &self,
         index: usize,
@@ -31,16 +32,15 @@ impl Reference {
         let virtual_part = ((1.0 - ratio) / 0.2).clamp(0.0, 1.0) / ratio;
         let own_part = 1.0 - 1.0 / ratio;
         let (change, rate) = (new - previous.velocity, previous.acceleration);
-        let (set, omega) = (previous.set_change, previous.start_velocity().angular);
-        let inertia = grain.inertia();
-        let gyroscopic = omega.cross(own_part * (inertia * omega));
+        let (set, inertia, start) = (previous.set_change, grain.inertia(), previous.inertia);
         let linear = own_part * change.linear - set.linear
             + virtual_part * (change.linear - previous.change);
-        let angular = own_part * change.angular - set.angular
-            + virtual_part * (change.angular - dt * rate.angular);
+        let spin = inertia * new.angular - start * previous.velocity.angular;
+        let angular = own_part * spin - start * set.angular
+            + virtual_part * (inertia * (change.angular - dt * rate.angular));
         [
             grain.mass() * linear + linear_impulse - dt * load.force,
-            inertia * angular + angular_impulse - dt * (load.torque - gyroscopic),
+            angular + angular_impulse - dt * load.torque,
         ]
     }
 
@@ -54,11 +54,11 @@ impl Reference {
         load: Load,
     ) -> Load {
         let start = previous.start_velocity();
-        let (grain, rate) = (&self.grains[index], (new - start) / self.dt);
-        let (inertia, omega) = (grain.inertia(), start.angular);
+        let grain = &self.grains[index];
+        let spin = grain.inertia() * new.angular - previous.inertia * start.angular;
         Load {
-            force: grain.mass() * rate.linear - load.force,
-            torque: inertia * rate.angular + omega.cross(inertia * omega) - load.torque,
+            force: grain.mass() * (new - start).linear / self.dt - load.force,
+            torque: spin / self.dt - load.torque,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3, IVec3};
+use glam::{DMat3, DQuat, DVec3, IVec3};
 use grainwake_shape::{Shape, ShapeOptions, analytic};
 
 use super::Reference;
@@ -436,6 +436,8 @@ fn new_velocities_satisfy_the_equations_of_motion() {
             case.reference.grains[index].density = density;
             let mut grain = case.reference.grains[index].clone();
             let previous = PreviousStep {
+                // That of the grain at another orientation.
+                inertia: grain.inertia() * 0.9 + DMat3::from_diagonal(DVec3::new(0.01, 0.0, 0.02)),
                 velocity: grain.rigid_velocity(),
                 acceleration: ACCELERATION,
                 change: DVec3::new(0.02, -0.01, 0.03),

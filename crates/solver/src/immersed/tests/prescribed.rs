@@ -80,8 +80,7 @@ impl PrescribedGrain {
     /// the step [m/s], and its velocity [m/s].
     pub fn step(&mut self, dt: f64, act: impl Fn(usize, usize, f64, &mut f64)) {
         let (kinematics, last_loads) = (self.grains.each_ref().map(RigidState::of), self.loads);
-        let velocity = self.grains[0].rigid_velocity();
-        let previous = [PreviousStep { velocity, ..Default::default() }];
+        let previous = self.grains.each_ref().map(PreviousStep::of);
         let mesh = *self.flow.mesh();
         self.flow.predict(dt);
         self.last_pressure.copy_from_slice(&self.flow.pressure);
