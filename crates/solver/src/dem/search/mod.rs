@@ -1,9 +1,9 @@
 //! Contact search: pairs of grains and walls that may touch, their penetrating points and the gaps
 //! between surfaces (Eqs 7-8).
 //!
-//! Broad phase (here): bounding spheres in cell lists, one for each power of two of the radius, with
-//! their periodic images. Narrow phase (`narrow_phase.rs`): surface patches of each grain in the
-//! distance field of its partner, and the deepest point of a sphere.
+//! Broad phase (here): bounding spheres with their periodic images in cell lists, one for each
+//! power of two of the radius. Narrow phase (`narrow_phase.rs`): surface patches of each grain in
+//! the distance field of its partner, and the deepest point of a sphere.
 
 mod deepest_point;
 pub mod gap;
