@@ -196,7 +196,10 @@ impl IntoException for SetupError {
 
 impl IntoException for StepError {
     fn into_exception(self) -> PyErr {
-        numerics(self.to_string())
+        match self {
+            StepError::Unstable { .. } => numerics(self.to_string()),
+            StepError::NotFinite { .. } => input(self.to_string()),
+        }
     }
 }
 

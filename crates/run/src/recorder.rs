@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk;
 use grainwake_formats::events::{Event, EventKind};
-use grainwake_formats::pvd::{self, Entry};
+use grainwake_formats::pvd::{Collection, Entry};
 use grainwake_formats::summary::{Cost, EndReason, GrainSummary, PairSummary, Scales, Summary};
 use grainwake_solver::sim::Simulation;
 
@@ -29,6 +29,8 @@ pub(crate) struct Recorder {
     at_events: bool,
     tables: Tables,
     vtk: VtkOutput,
+    /// Index of the VTK files.
+    collection: Collection,
     /// Watch of events and stop condition.
     pub watch: Watch,
     /// Whether contacts with walls are events.
@@ -57,6 +59,7 @@ impl Recorder {
             at_events: plan.at_events && sim.grains().len() <= 2,
             tables,
             vtk: VtkOutput::new(&plan.planes, sim),
+            collection: Collection::new(&run.join(INDEX)),
             watch,
             with_walls: plan.wall_events,
             series: Series::of(plan, &intervals),
@@ -242,13 +245,13 @@ impl Recorder {
         self.write_collection()
     }
 
-    /// Writes the index of the VTK files, unless there are none.
-    fn write_collection(&self) -> Result<(), RunError> {
+    /// Adds the new VTK files to their index, unless there are none at all.
+    fn write_collection(&mut self) -> Result<(), RunError> {
         if self.record.vtk_files.is_empty() {
             return Ok(());
         }
-        let path = self.run.join(INDEX);
-        pvd::write(&path, &self.record.vtk_files).context("write", &path)
+        let updated = self.collection.update(&self.record.vtk_files);
+        updated.context("write", &self.run.join(INDEX))
     }
 
     /// Writes the outputs of the last state, unless they have been written.

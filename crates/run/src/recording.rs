@@ -333,7 +333,9 @@ impl Recording {
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
     fn failed(&mut self, sim: &Simulation, source: StepError) -> RunError {
-        let StepError::Unstable { time: at, step, what, remedy } = &source;
+        let StepError::Unstable { time: at, step, what, remedy } = &source else {
+            unreachable!("only a step failed: {source}")
+        };
         let terms = terms(sim);
         let (remedy, time) = (remedy.advice(&terms), self.saved.time);
         let failure = serde_json::json!({

@@ -1,13 +1,14 @@
 //! Control of grains between steps.
 
-use grainwake_solver::dem::{Grain, MotionConstraint};
+use grainwake_solver::dem::{ContactLawKind, ContactParams, Grain, MotionConstraint};
 use grainwake_solver::flow::{Boundary, FluidParams};
 use grainwake_solver::glam::DVec3;
 use grainwake_solver::grid::{Axis, Mesh};
 use grainwake_solver::math::{Formula, Load};
 use grainwake_solver::shape::Shape;
 use grainwake_solver::sim::{
-    AnyFieldView, ControlError, MotionComponent, PrescribedMotion, Setup, Simulation, StepRule,
+    AnyFieldView, ControlError, MotionComponent, PrescribedMotion, Setup, Simulation, StepError,
+    StepRule,
 };
 
 const TRANSLATION: MotionComponent = MotionComponent::Translation;
@@ -137,6 +138,78 @@ fn unknown_grains_and_infinite_values_are_refused() {
     gone.grains[0].leave();
     let mut sim = Simulation::new(gone).unwrap();
     assert_eq!(sim.release(0, TRANSLATION), Err(ControlError::HasLeft { grain: 0 }));
+}
+
+/// Grains of this density are refused by the set-up too, unless their velocity is prescribed.
+#[test]
+fn a_grain_too_light_for_free_motion_is_not_released() {
+    let light = |velocity| {
+        let mut setup = setup();
+        (setup.grains[0].density, setup.grains[0].translation) = (1.0, velocity);
+        Simulation::new(setup)
+    };
+    assert!(light(MotionConstraint::Free).is_err());
+    let held = MotionConstraint::Prescribed(DVec3::ZERO);
+    let mut sim = light(held).unwrap();
+    assert_eq!(sim.release(0, TRANSLATION), Err(ControlError::TooLight { grain: 0 }));
+    assert_eq!(sim.grains()[0].translation, held);
+    sim.release(0, ROTATION).unwrap();
+}
+
+#[test]
+fn a_time_that_is_not_finite_is_refused() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    for time in [f64::NAN, f64::INFINITY] {
+        assert!(matches!(sim.advance_to(time), Err(StepError::NotFinite { .. })));
+    }
+    assert_eq!(sim.steps(), 0);
+}
+
+/// Contact with a stiffness of -50 N/m let a grain fall through the floor.
+#[test]
+fn contact_and_walls_without_a_meaning_are_refused() {
+    let message = |setup: Setup| Simulation::new(setup).err().unwrap().to_string();
+    let contact = ContactParams { normal_stiffness: -50.0, ..ContactParams::default() };
+    assert!(message(setup().with_contact(contact)).contains("normal stiffness"));
+    let hertz = ContactLawKind::HertzMindlin;
+    let mut soft = setup().with_contact(ContactParams { law: hertz, ..ContactParams::default() });
+    soft.grains[0].material.youngs_modulus = f64::NAN;
+    assert!(message(soft).contains("grain 0: the Young's modulus"));
+    for velocity in [1e-3 * DVec3::X, f64::NAN * DVec3::Y] {
+        let walls = [Boundary::WALL, Boundary::Wall { velocity }];
+        let boundaries = [walls, [Boundary::WALL; 2], [Boundary::WALL; 2]];
+        assert!(message(setup().with_boundaries(boundaries)).contains("a wall normal to x"));
+    }
+}
+
+/// A restored simulation goes on as a new one that is restored, whatever was set before.
+#[test]
+fn a_restored_simulation_has_the_control_of_its_set_up() {
+    let velocity = ["1e-3 * t / 1e-3", "0", "0"].map(String::from);
+    let by_formula = || {
+        let mut setup = setup();
+        let mut second = setup.grains[0].clone();
+        second.pose.position.z = 1e-3;
+        setup.grains.push(second);
+        setup.prescription.motions.push(PrescribedMotion {
+            grain: 1,
+            velocity: Some(Formula::parse(velocity.clone(), &["t"]).unwrap()),
+            angular_velocity: None,
+        });
+        Simulation::new(setup).unwrap()
+    };
+    let (mut used, mut new) = (by_formula(), by_formula());
+    advance(&mut used, 2);
+    let saved = state(&used);
+    used.set_external_load(0, Load { force: 1e-5 * DVec3::X, torque: DVec3::ZERO }).unwrap();
+    used.prescribe_velocity(0, ROTATION, DVec3::Z).unwrap();
+    used.release(1, TRANSLATION).unwrap();
+    advance(&mut used, 2);
+    for sim in [&mut used, &mut new] {
+        sim.restore(&mut &saved[..]).unwrap();
+        advance(sim, 3);
+    }
+    assert!(state(&used) == state(&new));
 }
 
 /// A simulation restored in a box with other wall velocities sees them in its first step: its state

@@ -4,7 +4,7 @@
 pub mod faults;
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -38,6 +38,14 @@ impl Output {
     /// Returns the open file, to be read or locked.
     pub fn file(&self) -> &File {
         &self.file
+    }
+
+    /// Sets the place of the next write, counted from the start [bytes].
+    ///
+    /// # Errors
+    /// Errors of the operating system.
+    pub fn seek(&mut self, place: u64) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(place)).map(drop)
     }
 
     /// Cuts the file off.

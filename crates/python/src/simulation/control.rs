@@ -135,6 +135,11 @@ impl PySimulation {
     ///     Index of the grain.
     /// translation, rotation : bool, default True
     ///     Motions to release.
+    ///
+    /// Raises
+    /// ------
+    /// CaseError
+    ///     The grain is too light to translate freely in the fluid, or the run folder is closed.
     #[pyo3(signature = (grain, *, translation = true, rotation = true))]
     fn release(
         slf: &Bound<'_, Self>,

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
+use super::material::Material;
 use crate::math::{Pose, RigidVelocity};
 
 /// Whether the three components of a velocity follow the equations of motion or are prescribed.
@@ -26,30 +27,6 @@ impl MotionConstraint {
             MotionConstraint::Prescribed(velocity) => velocity,
         }
     }
-}
-
-/// Elastic constants and restitution of one body; the linear contact law does not use them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
-    /// Young's modulus E [Pa]; infinite for a rigid body.
-    pub youngs_modulus: f64,
-    /// Poisson ratio nu.
-    pub poisson_ratio: f64,
-    /// Coefficient of restitution; a pair takes the smaller of its two values.
-    pub restitution: f64,
-}
-
-impl Default for Material {
-    /// Quartz without dissipation.
-    fn default() -> Self {
-        Material { youngs_modulus: 7e10, poisson_ratio: 0.17, restitution: 1.0 }
-    }
-}
-
-impl Material {
-    /// Undeformable body: the contact takes the elasticity and the restitution of its partner.
-    pub const RIGID: Material =
-        Material { youngs_modulus: f64::INFINITY, poisson_ratio: 0.0, restitution: 1.0 };
 }
 
 /// One grain. Velocities are at integer time levels, in the space frame.
@@ -113,13 +90,6 @@ impl Grain {
             }
         })
     }
-    /// Whether a free velocity would take the grain out of the plane with this normal axis.
-    pub fn leaves_plane(&self, normal: usize) -> bool {
-        let RigidVelocity { linear, mut angular } = self.rigid_velocity();
-        angular[normal] = 0.0;
-        self.translation == MotionConstraint::Free && linear[normal] != 0.0
-            || self.rotation == MotionConstraint::Free && angular != DVec3::ZERO
-    }
     /// A vector less its component out of the plane of motion.
     pub fn in_plane(&self, mut vector: DVec3) -> DVec3 {
         if let Some(normal) = self.plane_normal {
@@ -163,21 +133,5 @@ impl Grain {
     /// Rigid velocity V + Omega x (x - X) at a point of the space frame [m/s].
     pub fn velocity_at(&self, x: DVec3) -> DVec3 {
         self.rigid_velocity().at(x - self.pose.position)
-    }
-    /// Kinetic energy of translation and rotation [J].
-    pub fn kinetic_energy(&self) -> f64 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        0.5 * self.mass() * self.velocity.length_squared()
-            + 0.5 * omega.dot(self.principal_inertia() * omega)
-    }
-    /// Linear momentum [kg m/s].
-    pub fn momentum(&self) -> DVec3 {
-        self.mass() * self.velocity
-    }
-    /// Angular momentum about the point `about` [kg m^2/s, space frame].
-    pub fn angular_momentum(&self, about: DVec3) -> DVec3 {
-        let omega = self.pose.orientation.conjugate() * self.angular_velocity;
-        (self.pose.position - about).cross(self.momentum())
-            + self.pose.orientation * (self.principal_inertia() * omega)
     }
 }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 
-use super::grain::{Grain, Material, MotionConstraint};
-use crate::math::Pose;
+use super::grain::{Grain, MotionConstraint};
+use super::material::Material;
+use crate::math::{Pose, RigidVelocity};
 
 impl Grain {
     /// Free grain of `density` [kg/m^3] at rest at the origin.
@@ -52,5 +53,12 @@ impl Grain {
     pub fn held(mut self) -> Grain {
         self.hold();
         self
+    }
+    /// Whether a free velocity would take the grain out of the plane with this normal axis.
+    pub fn leaves_plane(&self, normal: usize) -> bool {
+        let RigidVelocity { linear, mut angular } = self.rigid_velocity();
+        angular[normal] = 0.0;
+        self.translation == MotionConstraint::Free && linear[normal] != 0.0
+            || self.rotation == MotionConstraint::Free && angular != DVec3::ZERO
     }
 }

@@ -5,7 +5,8 @@
 //! 1. `motion`: sub-steps, integrator, rotation, response of the fluid, checkpoint of the contacts;
 //! 2. `contact`: force laws, friction history, lubrication;
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
-//! 4. `grain`, its set-up in `grain_setup`, and `enclosure`: the bodies and the box.
+//! 4. `grain`, with `grain_setup` and `grain_momentum`, `material` and `enclosure`: the bodies and
+//!    the box.
 //!
 //! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
 //! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the
@@ -14,13 +15,16 @@
 mod contact;
 mod enclosure;
 mod grain;
+mod grain_momentum;
 mod grain_setup;
+mod material;
 mod motion;
 mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner, Side};
-pub use grain::{Grain, Material, MotionConstraint};
+pub use grain::{Grain, MotionConstraint};
+pub use material::Material;
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };

@@ -1,11 +1,12 @@
 //! Control of grains between steps: velocities, prescribed motion and external loads.
 //!
-//! Control is not part of the saved state: after [`Simulation::restore`] prescribed motions and
-//! external loads have to be set again.
+//! Control is not part of the saved state: [`Simulation::restore`] returns to the control of the
+//! set-up, and prescribed motions and external loads have to be set again.
 
 use glam::DVec3;
 
-use super::Simulation;
+use super::setup::LIGHTEST_FREE_GRAIN;
+use super::{PrescribedMotion, Setup, Simulation};
 use crate::dem::{Grain, MotionConstraint};
 use crate::math::Load;
 
@@ -48,6 +49,37 @@ pub enum ControlError {
         /// "velocity", "angular velocity".
         quantity: &'static str,
     },
+    /// A grain so light would become unstable if it moved freely.
+    #[error(
+        "grain {grain} is lighter than {LIGHTEST_FREE_GRAIN} times the fluid and would become unstable; keep its velocity prescribed"
+    )]
+    TooLight {
+        /// Index of the grain.
+        grain: usize,
+    },
+}
+
+/// Control at the start of a run, in force again in a simulation that is restored.
+pub(super) struct InitialControl {
+    /// Constraints of translation and rotation of each grain.
+    constraints: Vec<[MotionConstraint; 2]>,
+    motions: Vec<PrescribedMotion>,
+}
+
+impl InitialControl {
+    pub fn of(setup: &Setup) -> InitialControl {
+        let constraints = setup.grains.iter().map(|grain| [grain.translation, grain.rotation]);
+        InitialControl {
+            constraints: constraints.collect(),
+            motions: setup.prescription.motions.clone(),
+        }
+    }
+    pub fn apply(&self, setup: &mut Setup) {
+        for (grain, constraints) in setup.grains.iter_mut().zip(&self.constraints) {
+            [grain.translation, grain.rotation] = *constraints;
+        }
+        setup.prescription.motions.clone_from(&self.motions);
+    }
 }
 
 /// Component of the motion of a grain.
@@ -130,13 +162,17 @@ impl Simulation {
     /// velocity. A formula of the set-up for this motion is removed.
     ///
     /// # Errors
-    /// [`ControlError`] for a grain that is unknown or has left.
+    /// [`ControlError`] for a grain that is unknown, has left or is too light to translate freely.
     pub fn release(
         &mut self,
         grain: usize,
         component: MotionComponent,
     ) -> Result<(), ControlError> {
         self.check_control(grain, true, component.quantity())?;
+        let is_translation = component == MotionComponent::Translation;
+        if is_translation && self.setup.is_too_light(&self.setup.grains[grain]) {
+            return Err(ControlError::TooLight { grain });
+        }
         self.remove_formula(grain, component);
         *component.of(&mut self.setup.grains[grain]).0 = MotionConstraint::Free;
         Ok(())

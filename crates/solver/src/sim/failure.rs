@@ -94,6 +94,12 @@ impl fmt::Display for Remedy {
 /// Failure of a step.
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
+    /// A simulation cannot be advanced to this time; its state has not changed.
+    #[error("the time to advance to must be finite, not {time} s")]
+    NotFinite {
+        /// Time [s].
+        time: f64,
+    },
     /// The state is not finite, the CFL number is too large, grains overlap too far, or a grain of
     /// a run with a refined box reaches a free surface.
     #[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
@@ -112,8 +118,12 @@ pub enum StepError {
 impl StepError {
     /// Returns the message with an advice in the given terms.
     pub fn message(&self, terms: &RemedyTerms) -> String {
-        let StepError::Unstable { time, step, what, remedy } = self;
-        format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
+        match self {
+            StepError::Unstable { time, step, what, remedy } => {
+                format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
+            }
+            StepError::NotFinite { .. } => self.to_string(),
+        }
     }
 }
 

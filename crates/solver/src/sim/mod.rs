@@ -31,6 +31,7 @@ use crate::immersed::{OpenSides, PreviousStep};
 use crate::math::{Load, Pose, RigidVelocity};
 
 use clock::Clock;
+use control::InitialControl;
 use fluid::Fluid;
 use timing::PassTimes;
 
@@ -71,6 +72,7 @@ struct StepData {
     previous: Vec<PreviousStep>,
     /// Poses at the start of the step, and the velocities that the fluid has there.
     kinematics: Vec<RigidState>,
+    initial_control: InitialControl,
     /// Loads set between steps.
     external: Vec<Load>,
     /// Weight less buoyancy, and external load.
@@ -100,6 +102,7 @@ impl StepData {
             loads: vec![Load::default(); count],
             previous: grains.iter().map(PreviousStep::of).collect(),
             kinematics: grains.iter().map(RigidState::of).collect(),
+            initial_control: InitialControl::of(setup),
             external: vec![Load::default(); count],
             applied: vec![Load::default(); count],
             driving: vec![Load::default(); count],

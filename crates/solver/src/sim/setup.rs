@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dem::{ContactParams, Enclosure, Grain, MotionConstraint, Side};
+use crate::dem::{ContactLawKind, ContactParams, Enclosure, Grain, MotionConstraint, Side};
 use crate::flow::{Boundaries, Boundary, FluidParams, RefinedBox};
 use crate::grid::Mesh;
 use crate::immersed::{Scheme, Start};
@@ -233,6 +233,16 @@ impl Setup {
             if (*lower == Boundary::Periodic) != (*upper == Boundary::Periodic) {
                 return fail(format!("axis {name} is periodic on one side only"));
             }
+            for side in [lower, upper] {
+                if let Boundary::Wall { velocity } = side
+                    && (velocity[axis] != 0.0 || !velocity.is_finite())
+                {
+                    return fail(format!(
+                        "a wall normal to {name} has the velocity {velocity} m/s: it must be finite \
+                         and in the plane of the wall"
+                    ));
+                }
+            }
             if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
                 return fail(format!(
                     "axis {name} has one cell, so both its sides must be periodic"
@@ -257,7 +267,18 @@ impl Setup {
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
             return fail(format!("the density of grain {i} must be positive"));
         }
-        if let Some(i) = self.too_light_grain() {
+        self.contact.validate().map_err(SetupError::Inconsistent)?;
+        if self.contact.law == ContactLawKind::HertzMindlin {
+            for (i, grain) in self.grains.iter().enumerate() {
+                let in_words = |message| SetupError::Inconsistent(format!("grain {i}: {message}"));
+                grain.material.validate().map_err(in_words)?;
+            }
+        }
+        let motions = &self.prescription.motions;
+        let by_formula = |i| motions.iter().any(|m| m.grain == i && m.velocity.is_some());
+        let is_free = |grain: &Grain| grain.translation == MotionConstraint::Free;
+        let too_light = |(i, grain)| is_free(grain) && self.is_too_light(grain) && !by_formula(i);
+        if let Some(i) = self.grains.iter().enumerate().position(too_light) {
             return fail(format!(
                 "grain {i} is lighter than {LIGHTEST_FREE_GRAIN} times the fluid: free grains \
                  become unstable below it; prescribe its velocity, or take a denser grain"
@@ -290,7 +311,6 @@ impl Setup {
         {
             return fail("the margin of the refined box must be positive".into());
         }
-        let motions = &self.prescription.motions;
         if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {
             let grain = motion.grain;
             return fail(format!("a motion is given for grain {grain}, which is not there"));
@@ -311,15 +331,9 @@ impl Setup {
         (0..3).find(|axis| self.fluid.is_some() && !self.mesh.is_resolved(*axis))
     }
 
-    /// Index of the first free grain that is too light for the coupling.
-    fn too_light_grain(&self) -> Option<usize> {
-        let least = LIGHTEST_FREE_GRAIN * self.fluid?.density;
-        let motions = &self.prescription.motions;
-        let by_formula = |i| motions.iter().any(|m| m.grain == i && m.velocity.is_some());
-        self.grains.iter().enumerate().position(|(i, grain)| {
-            let is_free = grain.translation == MotionConstraint::Free && !by_formula(i);
-            is_free && grain.density < least
-        })
+    /// Returns whether a grain is too light for the coupling if it moves freely.
+    pub(super) fn is_too_light(&self, grain: &Grain) -> bool {
+        self.fluid.is_some_and(|fluid| grain.density < LIGHTEST_FREE_GRAIN * fluid.density)
     }
 }
 

@@ -48,7 +48,8 @@ impl Simulation {
         self.data.dynamics.save(writer)
     }
 
-    /// Restores a state written by [`Simulation::save`] from the same set-up.
+    /// Restores a state written by [`Simulation::save`] from the same set-up. Prescribed motions
+    /// are those of the set-up again, and no external load acts.
     ///
     /// # Errors
     /// `InvalidData` if the state does not fit this set-up; the simulation is then unusable. Errors
@@ -58,8 +59,11 @@ impl Simulation {
         let steps = input.u64()?;
         self.clock.restore(steps, input.numbers()?);
         input.expect(self.setup.grains.len(), "grains")?;
-        let grains = self.setup.grains.iter_mut();
         let data = &mut self.data;
+        // A grain that has left in the meantime may move again.
+        data.initial_control.apply(&mut self.setup);
+        data.external.fill(Load::default());
+        let grains = self.setup.grains.iter_mut();
         for ((grain, load), previous) in grains.zip(&mut data.loads).zip(&mut data.previous) {
             grain.pose = restore_pose(&mut input, &self.setup.mesh)?;
             grain.velocity = input.vector()?;

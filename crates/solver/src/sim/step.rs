@@ -10,8 +10,12 @@ impl Simulation {
     /// Advances the simulation to `time` [s], in steps of which the last ends there.
     ///
     /// # Errors
-    /// [`StepError::Unstable`] as in [`Simulation::step`].
+    /// [`StepError::NotFinite`] if `time` is not finite; [`StepError::Unstable`] as in
+    /// [`Simulation::step`].
     pub fn advance_to(&mut self, time: f64) -> Result<(), StepError> {
+        if !time.is_finite() {
+            return Err(StepError::NotFinite { time });
+        }
         while self.clock.time < time * (1.0 - SAME_TIME) {
             self.step(time - self.clock.time)?;
         }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::hertz_mindlin::HertzMindlin;
 use super::law::{BodyProperties, ContactLaw, Linear, PairProperties};
-use crate::dem::grain::{Grain, Material};
+use crate::dem::grain::Grain;
+use crate::dem::material::{FRACTION, Material, NOT_NEGATIVE, POSITIVE, check};
 
 /// Force laws of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,6 +85,35 @@ impl Default for ContactParams {
 impl ContactParams {
     /// Restitution below which the dashpot grows no further.
     pub const MIN_RESTITUTION: f64 = 0.05;
+
+    /// Checks the range of each parameter, and of the wall material if the law uses it.
+    ///
+    /// # Errors
+    /// A message with the parameter, its value and its range.
+    pub fn validate(&self) -> Result<(), String> {
+        let is_linear = self.law == ContactLawKind::Linear;
+        if is_linear {
+            check("normal stiffness", self.normal_stiffness, POSITIVE)?;
+        } else {
+            self.wall_material.validate().map_err(|message| format!("walls: {message}"))?;
+        }
+        check("substeps per contact", self.substeps_per_contact, POSITIVE)?;
+        check("restitution", self.restitution, FRACTION)?;
+        for (name, value) in [
+            ("tangential ratio", self.tangential_ratio),
+            ("friction", self.friction),
+            ("wall friction", self.wall_friction),
+            ("tangential damping", self.tangential_damping),
+            ("global damping", self.global_damping),
+            ("lubrication gap", self.lubrication_gap),
+            ("lubrication viscosity", self.lubrication_viscosity),
+            ("added density", self.added_density),
+        ] {
+            check(name, value, NOT_NEGATIVE)?;
+        }
+        check("roughness", self.roughness, ("at least 0", |x| x >= 0.0))?;
+        check("overlap limit", self.overlap_limit, ("positive", |x| x > 0.0))
+    }
 
     /// Damping ratio of the linear law, c / (2 sqrt(k m)), that gives `restitution`.
     pub fn damping_ratio(&self) -> f64 {
@@ -234,6 +264,34 @@ mod tests {
                 let reached = stiff.0.impact_overlap(&stiff.1, 0.1) / full;
                 assert!((reached - 0.1).abs() < 1e-9, "{law:?}, {speed} m/s: {reached}");
             }
+        }
+    }
+
+    #[test]
+    fn parameters_without_a_meaning_are_refused() {
+        let refused = |change: &dyn Fn(&mut ContactParams)| {
+            let mut params = ContactParams::default();
+            change(&mut params);
+            params.validate().unwrap_err()
+        };
+        let message = refused(&|params| params.normal_stiffness = -50.0);
+        assert_eq!(message, "the normal stiffness must be positive and finite, not -50");
+        let hertz = ContactLawKind::HertzMindlin;
+        let changes: [&dyn Fn(&mut ContactParams); 8] = [
+            &|params| params.normal_stiffness = f64::NAN,
+            &|params| params.substeps_per_contact = 0.0,
+            &|params| params.friction = f64::NAN,
+            &|params| params.wall_friction = -0.1,
+            &|params| params.restitution = 1.1,
+            &|params| params.roughness = f64::NAN,
+            &|params| params.overlap_limit = 0.0,
+            &|params| (params.law, params.wall_material.poisson_ratio) = (hertz, 0.6),
+        ];
+        for change in changes {
+            refused(change);
+        }
+        for law in [ContactLawKind::Linear, hertz] {
+            assert_eq!(ContactParams { law, ..Default::default() }.validate(), Ok(()));
         }
     }
 

@@ -8,7 +8,8 @@ use grainwake_shape::Shape;
 use rayon::prelude::*;
 
 use crate::dem::contact::{BodyProperties, BodyState, SubstepVelocity};
-use crate::dem::grain::{Grain, Material, MotionConstraint};
+use crate::dem::grain::{Grain, MotionConstraint};
+use crate::dem::material::Material;
 use crate::dem::search::{PatchTree, PosedShape};
 use crate::math::{Load, Matrix6, RigidVelocity, Vector6};
 

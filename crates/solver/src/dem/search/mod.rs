@@ -1,9 +1,9 @@
 //! Contact search: pairs of grains and walls that may touch, their penetrating points and the gaps
 //! between surfaces (Eqs 7-8).
 //!
-//! Broad phase (here): bounding spheres in a cell list, with their periodic images. Narrow phase
-//! (`narrow_phase.rs`): surface patches of each grain in the distance field of its partner, and the
-//! deepest point of a sphere.
+//! Broad phase (here): bounding spheres with their periodic images in cell lists, one for each
+//! power of two of the radius. Narrow phase (`narrow_phase.rs`): surface patches of each grain in
+//! the distance field of its partner, and the deepest point of a sphere.
 
 mod deepest_point;
 pub mod gap;
@@ -27,6 +27,8 @@ use super::enclosure::{Enclosure, PairKey, Partner};
 const MAX_PERIODS: i32 = 4;
 /// Largest number of a cell along an axis; spheres farther away share the last cell.
 const CELL_LIMIT: DVec3 = DVec3::splat(1e9);
+/// Finest level of the cell lists; it contains all spheres smaller than 2^-20 of the largest.
+const FINEST: i32 = 20;
 
 /// Bounding sphere of a grain with a margin, such as its displacement until the next search.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +42,9 @@ pub(crate) struct BoundingSphere {
 /// Centre of a bounding sphere or of one of its periodic images.
 #[derive(Clone, Copy, Debug)]
 struct ImageCentre {
-    /// Cell along z, y and x.
+    /// Level of the cell list: 0 for radii above half the largest, 1 above a quarter, and so on.
+    level: i32,
+    /// Cell of that level along z, y and x.
     cell: [i32; 3],
     position: DVec3,
     grain: u32,
@@ -53,7 +57,7 @@ struct ImageCentre {
 /// Cell-list search with its buffers, reused by the next search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BroadPhase {
-    /// All centres, sorted by cell.
+    /// All centres, sorted by level, then by cell.
     centres: Vec<ImageCentre>,
     /// Pairs that may touch, in ascending order.
     pub pairs: Vec<PairKey>,
@@ -62,21 +66,20 @@ pub(crate) struct BroadPhase {
 impl BroadPhase {
     /// Fills `pairs`. A sphere that is not finite is in no pair.
     pub fn search(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure) {
-        self.list_images(spheres, enclosure);
-        self.centres.sort_unstable_by_key(|centre| centre.cell);
+        let radii = spheres.iter().map(|sphere| sphere.radius);
+        let largest = radii.filter(|radius| radius.is_finite()).fold(0.0, f64::max);
+        self.list_images(spheres, enclosure, largest);
+        self.centres.sort_unstable_by_key(|centre| (centre.level, centre.cell));
         self.pairs.clear();
+        // One cell size for all would put every small sphere next to a large one in a few cells.
+        let levels = || self.centres.chunk_by(|a, b| a.level == b.level);
+        for (index, fine) in levels().enumerate() {
+            for coarse in levels().take(index + 1) {
+                list_pairs(fine, coarse, spheres, largest, &mut self.pairs);
+            }
+        }
         for own in self.centres.iter().filter(|centre| centre.inside) {
             let sphere = &spheres[own.grain as usize];
-            for other in centres_around(&self.centres, own.cell) {
-                let image = (other.image - own.image).to_array();
-                // Each pair is listed once; a grain may touch its own image.
-                let listed = (other.grain, image) > (own.grain, [0; 3]);
-                let limit = sphere.radius + spheres[other.grain as usize].radius;
-                if listed && own.position.distance_squared(other.position) <= limit * limit {
-                    let partner = Partner::Grain(other.grain as usize);
-                    self.pairs.push(PairKey { grain: own.grain, partner, image });
-                }
-            }
             for face in enclosure.faces() {
                 if face.distance(sphere.centre) <= sphere.radius {
                     let partner = face.partner;
@@ -88,12 +91,9 @@ impl BroadPhase {
     }
 
     /// Lists the image of every grain inside the box, and the images that may touch a sphere whose
-    /// centre is in the box.
-    fn list_images(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure) {
+    /// centre is in the box; `largest` is the largest radius [m].
+    fn list_images(&mut self, spheres: &[BoundingSphere], enclosure: &Enclosure, largest: f64) {
         self.centres.clear();
-        let radii = spheres.iter().map(|sphere| sphere.radius);
-        let largest = radii.filter(|radius| radius.is_finite()).fold(0.0, f64::max);
-        let cell_size = (2.0 * largest).max(f64::MIN_POSITIVE);
         let period = enclosure.period();
         let most = IVec3::splat(MAX_PERIODS);
         for (grain, sphere) in spheres.iter().enumerate() {
@@ -102,20 +102,62 @@ impl BroadPhase {
             }
             let wrap = -enclosure.periods_outside(sphere.centre);
             let inside = sphere.centre + wrap.as_dvec3() * period;
+            let is_above = |level: &i32| sphere.radius > largest_radius(largest, level + 1);
+            let level = (0..FINEST).find(is_above).unwrap_or(FINEST);
             let reach = sphere.radius + largest;
             let down = enclosure.periods(inside - (enclosure.lower - reach), f64::floor);
             let up = enclosure.periods(enclosure.upper + reach - inside, f64::floor);
             for shift in shifts(-down.clamp(IVec3::ZERO, most), up.clamp(IVec3::ZERO, most)) {
                 let position = inside + shift.as_dvec3() * period;
-                // The limit keeps the numbers of neighbour cells in the range of the integers.
-                let cell = (position / cell_size).floor().clamp(-CELL_LIMIT, CELL_LIMIT).as_ivec3();
                 self.centres.push(ImageCentre {
-                    cell: [cell.z, cell.y, cell.x],
+                    level,
+                    cell: cell_of(position, largest_radius(largest, level)),
                     position,
                     grain: grain as u32,
                     image: wrap + shift,
                     inside: shift == IVec3::ZERO,
                 });
+            }
+        }
+    }
+}
+
+/// Largest radius of the spheres of a level [m], if that of all is `largest`.
+fn largest_radius(largest: f64, level: i32) -> f64 {
+    largest * 0.5f64.powi(level)
+}
+
+/// Cell `[z, y, x]` of a position in a list for radii up to `radius` [m].
+fn cell_of(position: DVec3, radius: f64) -> [i32; 3] {
+    let size = (2.0 * radius).max(f64::MIN_POSITIVE);
+    // The limit keeps the numbers of neighbour cells in the range of the integers.
+    let cell = (position / size).floor().clamp(-CELL_LIMIT, CELL_LIMIT).as_ivec3();
+    [cell.z, cell.y, cell.x]
+}
+
+/// Adds the pairs of a sphere of the list `fine` with one of `coarse`, the same list or one with
+/// larger cells; `largest` is the largest radius of all spheres [m].
+fn list_pairs(
+    fine: &[ImageCentre],
+    coarse: &[ImageCentre],
+    spheres: &[BoundingSphere],
+    largest: f64,
+    pairs: &mut Vec<PairKey>,
+) {
+    let (level, is_same) = (coarse[0].level, coarse[0].level == fine[0].level);
+    for own in fine.iter().filter(|own| own.inside || !is_same) {
+        let radius = spheres[own.grain as usize].radius;
+        for other in centres_around(coarse, cell_of(own.position, largest_radius(largest, level))) {
+            let is_first = is_same || own.grain < other.grain;
+            let [first, second] = if is_first { [own, other] } else { [other, own] };
+            let image = (second.image - first.image).to_array();
+            // Each pair is listed once, with its first grain in the box; a grain may touch its own
+            // image.
+            let listed = first.inside && (second.grain, image) > (first.grain, [0; 3]);
+            let limit = radius + spheres[other.grain as usize].radius;
+            if listed && own.position.distance_squared(other.position) <= limit * limit {
+                let partner = Partner::Grain(second.grain as usize);
+                pairs.push(PairKey { grain: first.grain, partner, image });
             }
         }
     }
@@ -159,6 +201,15 @@ mod tests {
             .collect()
     }
 
+    /// Spheres whose radii range over four orders of magnitude.
+    fn polydisperse(count: usize, seed: u64) -> Vec<BoundingSphere> {
+        let mut spheres = scatter(count, seed);
+        for (n, sphere) in spheres.iter_mut().enumerate() {
+            sphere.radius = 0.3 * 0.1f64.powi(n as i32 % 5);
+        }
+        spheres
+    }
+
     fn naive(spheres: &[BoundingSphere], enclosure: &Enclosure) -> Vec<PairKey> {
         let mut pairs = Vec::new();
         for (i, a) in spheres.iter().enumerate() {
@@ -189,13 +240,39 @@ mod tests {
                 periodic,
                 sides: Default::default(),
             };
-            let spheres = scatter(120, seed);
-            let mut broad = BroadPhase::default();
-            broad.search(&spheres, &enclosure);
-            let expected = naive(&spheres, &enclosure);
-            assert!(expected.len() > 20);
-            assert_eq!(broad.pairs, expected, "{periodic:?}");
+            for spheres in [scatter(120, seed), polydisperse(120, seed)] {
+                let mut broad = BroadPhase::default();
+                broad.search(&spheres, &enclosure);
+                let expected = naive(&spheres, &enclosure);
+                assert!(expected.len() > 20);
+                assert_eq!(broad.pairs, expected, "{periodic:?}");
+            }
         }
+    }
+
+    /// With cells as large as the largest sphere, the small ones were compared all with all.
+    #[test]
+    fn one_large_sphere_does_not_slow_the_search_down() {
+        let enclosure = Enclosure {
+            lower: DVec3::ZERO,
+            upper: DVec3::ONE,
+            periodic: [true; 3],
+            sides: Default::default(),
+        };
+        let mut spheres = scatter(40_000, 4);
+        spheres.iter_mut().for_each(|sphere| sphere.radius = 2e-3);
+        let time = |spheres: &[BoundingSphere]| {
+            let mut broad = BroadPhase::default();
+            let start = std::time::Instant::now();
+            broad.search(spheres, &enclosure);
+            (start.elapsed().as_secs_f64(), broad.pairs.len())
+        };
+        let (equal, few) =
+            (0..3).map(|_| time(&spheres)).reduce(|a, b| (a.0.min(b.0), a.1)).unwrap();
+        spheres[7].radius = 0.2;
+        let (mixed, more) = time(&spheres);
+        println!("{equal} s, {few} pairs; with a large sphere {mixed} s, {more} pairs");
+        assert!(more > few && mixed < 20.0 * equal, "{mixed} s instead of {equal} s");
     }
 
     #[test]

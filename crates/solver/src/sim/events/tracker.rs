@@ -12,6 +12,8 @@ use crate::math::RigidVelocity;
 pub struct Tracker {
     params: EventParams,
     state: TrackerState,
+    /// Whether each grain has left, as the events say.
+    has_left: Vec<bool>,
 }
 
 /// Variable part of a tracker.
@@ -39,7 +41,7 @@ impl Tracker {
             still_since: None,
             events: Vec::new(),
         };
-        Tracker { params, state }
+        Tracker { params, state, has_left: vec![false; grains.len()] }
     }
 
     /// Processes the state after a step and returns its events, oldest first; `velocity` returns
@@ -75,11 +77,9 @@ impl Tracker {
     }
 
     fn update_left(&mut self, time: f64, grains: &[Grain]) {
-        for (index, _) in grains.iter().enumerate().filter(|(_, grain)| grain.has_left()) {
-            let left = Event::new(EventKind::Left, time, &[index]);
-            let same = |event: &Event| event.kind == left.kind && event.grains == left.grains;
-            if !self.state.events.iter().any(same) {
-                self.state.events.push(left);
+        for (index, (grain, has_left)) in grains.iter().zip(&mut self.has_left).enumerate() {
+            if grain.has_left() && !std::mem::replace(has_left, true) {
+                self.state.events.push(Event::new(EventKind::Left, time, &[index]));
             }
         }
     }
@@ -149,8 +149,8 @@ impl Tracker {
     }
     /// Gap between the surfaces of a pair after the last step [m]; none once a grain has left.
     pub fn gap(&self) -> Option<f64> {
-        let complete = self.first(EventKind::Left).is_none();
-        self.state.pair.as_ref().filter(|_| complete).map(|p| p.gap)
+        let pair = self.state.pair.as_ref().filter(|_| !self.has_left.contains(&true));
+        pair.map(|pair| pair.gap)
     }
     /// Time of the first contact of the pair [s].
     pub fn kiss_time(&self) -> Option<f64> {
@@ -189,6 +189,13 @@ impl Tracker {
     /// Restores the state of a checkpoint.
     pub fn restore(&mut self, state: TrackerState) {
         self.state = state;
+        self.has_left.fill(false);
+        let left = self.state.events.iter().filter(|event| event.kind == EventKind::Left);
+        for grain in left.flat_map(|event| &event.grains) {
+            if let Some(has_left) = self.has_left.get_mut(*grain) {
+                *has_left = true;
+            }
+        }
     }
 }
 
