@@ -18,7 +18,7 @@ use glam::DVec3;
 use grainwake_shape::Shape;
 
 use crate::dem::Grain;
-use crate::math::{Matrix6, Pose, RigidVelocity};
+use crate::math::{Load, Matrix6, Pose, RigidVelocity, Vector6, multiply6};
 
 /// Sub-volumes along each axis of the box around a grain.
 const SUBDIVISIONS: usize = 32;
@@ -118,6 +118,46 @@ impl EmergedPart {
             }
         }
         part
+    }
+}
+
+/// Effects of the part of a grain beyond a free surface.
+#[derive(Clone, Copy, Debug)]
+pub struct EmergedLoads {
+    /// Inertia of the fluid that this part does not displace.
+    pub inertia: Matrix6,
+    /// Rate of change of the momentum of this fluid at constant velocities, by its rotation.
+    turning: Load,
+    /// Load of the pressure at the surface.
+    pub pressure: Load,
+}
+
+impl EmergedLoads {
+    /// Effects of `part` under the load of the `pressure` at the surface; `omega` [rad/s] is the
+    /// angular velocity at the middle of the step.
+    pub fn new(
+        part: &EmergedPart,
+        pressure: Load,
+        omega: DVec3,
+        fluid_density: f64,
+    ) -> EmergedLoads {
+        let inertia = part.inertia.map(|row| row.map(|entry| fluid_density * entry));
+        let row = |n: usize| DVec3::from_slice(&inertia[n][3..]).dot(omega);
+        let turning = Load {
+            force: fluid_density * omega.cross(omega.cross(part.moment)),
+            torque: omega.cross(DVec3::new(row(3), row(4), row(5))),
+        };
+        EmergedLoads { inertia, turning, pressure }
+    }
+
+    /// Change of the momentum of this fluid if the velocities change by `change` in `dt` [s].
+    pub fn momentum(&self, change: RigidVelocity, dt: f64) -> Vector6 {
+        let mut momentum = multiply6(&self.inertia, &change.to_vector());
+        let turning = [self.turning.force, self.turning.torque];
+        for (n, momentum) in momentum.iter_mut().enumerate() {
+            *momentum += dt * turning[n / 3][n % 3];
+        }
+        momentum
     }
 }
 

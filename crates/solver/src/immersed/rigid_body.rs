@@ -13,7 +13,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::emerged::EmergedPart;
+use super::emerged::{EmergedLoads, EmergedPart};
 use super::rigidity::Impulse;
 use crate::dem::{Grain, GrainResponse, MotionConstraint};
 use crate::math::{Load, Matrix6, RigidVelocity, Vector6, multiply6, solve6};
@@ -86,47 +86,6 @@ pub struct RigidBodySystem {
     last_load: Option<Load>,
 }
 
-/// Effects of the part of a grain beyond a free surface.
-#[derive(Clone, Copy, Debug)]
-struct EmergedLoads {
-    /// Inertia of the fluid that this part does not displace.
-    inertia: Matrix6,
-    /// Rate of change of the momentum of this fluid at constant velocities, by its rotation.
-    turning: Load,
-    /// Load of the pressure at the surface.
-    pressure: Load,
-}
-
-impl EmergedLoads {
-    fn new(
-        part: &EmergedPart,
-        pressure: Load,
-        previous: &PreviousStep,
-        fluid_density: f64,
-        dt: f64,
-    ) -> EmergedLoads {
-        let inertia = part.inertia.map(|row| row.map(|entry| fluid_density * entry));
-        // Velocity at the middle of the step.
-        let omega = previous.start_velocity().angular + 0.5 * dt * previous.acceleration.angular;
-        let row = |n: usize| DVec3::from_slice(&inertia[n][3..]).dot(omega);
-        let turning = Load {
-            force: fluid_density * omega.cross(omega.cross(part.moment)),
-            torque: omega.cross(DVec3::new(row(3), row(4), row(5))),
-        };
-        EmergedLoads { inertia, turning, pressure }
-    }
-
-    /// Change of the momentum of this fluid if the velocities change by `change` in `dt` [s].
-    fn momentum(&self, change: RigidVelocity, dt: f64) -> Vector6 {
-        let mut momentum = multiply6(&self.inertia, &change.to_vector());
-        let turning = [self.turning.force, self.turning.torque];
-        for (n, momentum) in momentum.iter_mut().enumerate() {
-            *momentum += dt * turning[n / 3][n % 3];
-        }
-        momentum
-    }
-}
-
 impl RigidBodySystem {
     /// Assembles the equations of a grain that leaves the box under the `applied` load and the
     /// hydrodynamic load of the last step, `last_load`, over `dt` [s], without contact.
@@ -155,8 +114,9 @@ impl RigidBodySystem {
         surface: Option<(&EmergedPart, Load)>,
         dt: f64,
     ) -> RigidBodySystem {
+        let middle = previous.start_velocity().angular + 0.5 * dt * previous.acceleration.angular;
         let surface =
-            surface.map(|(part, load)| EmergedLoads::new(part, load, previous, fluid_density, dt));
+            surface.map(|(part, load)| EmergedLoads::new(part, load, middle, fluid_density));
         let applied = surface.map_or(applied, |surface| applied + surface.pressure);
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
