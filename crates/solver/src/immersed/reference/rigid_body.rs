@@ -14,9 +14,9 @@ impl Reference {
     /// the previous velocities to `new`, under the `load` of weight, buoyancy and contact:
     ///
     /// (m - m_f)(V - V_old) - m dV + m_v (V - V_old - previous change) + J - dt F = 0 with the
-    /// change dV that was set between the steps. The same with I, Omega and the previous acceleration
-    /// times dt; I has the orientation at the start of the step where it multiplies Omega_old or
-    /// dOmega, and that at its end elsewhere.
+    /// change dV that was set between the steps. The same with I, Omega and the previous
+    /// acceleration times dt; I has the orientation at the start of the step where it multiplies
+    /// Omega_old or dOmega, and that at its end elsewhere.
     pub fn momentum_residual(
         &self,
         index: usize,
