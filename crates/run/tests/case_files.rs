@@ -475,6 +475,43 @@ fn the_speed_of_an_inflow_counts_for_the_resolution() {
 }
 
 #[test]
+fn blockage_is_that_of_the_flow_past_the_grain_with_and_without_gravity() {
+    let case = |boundaries: &str, motion: &str, more: &str| {
+        good(&format!(
+            "{more}\n[fluid]\ndensity = 1000\nviscosity = \"10 mPa s\"\n\
+             [domain]\nsize = [\"3 mm\", \"3 mm\", \"12 mm\"]\ncell_size = \"0.25 mm\"\n\
+             boundaries = {{ {boundaries} }}\n[time]\nend = \"0.02 s\"\n\
+             [[grain]]\nshape = {{ kind = \"sphere\", diameter = \"2 mm\" }}\ndensity = 1000\n\
+             position = [\"1.5 mm\", \"1.5 mm\", \"6 mm\"]\n{motion}"
+        ))
+        .estimate(1)
+    };
+    let none = "gravity = [0, 0, 0]";
+    let through = "z = [\"outflow\", { kind = \"inflow\", velocity = [0, 0, -0.1] }]";
+    let towed = "motion = { velocity = [0, 0, \"-0.1 m/s\"], angular_velocity = \"fixed\" }";
+    let swung = "motion = { velocity = { formula = [0, 0, \"0.1*sin(600*t)\"] } }";
+    let sideways = "gravity = [9.81, 0, 0]";
+    let along_z = std::f64::consts::PI / 9.0;
+    for (boundaries, motion, gravity) in [
+        ("", towed, none),
+        ("", swung, none),
+        (through, "motion = \"fixed\"", none),
+        (through, "", none),
+        (through, "motion = \"fixed\"", sideways),
+        ("", "", ""),
+    ] {
+        let estimate = case(boundaries, motion, gravity);
+        let blockage = estimate.blockage.expect("a blockage");
+        assert!((blockage - along_z).abs() < 1e-9, "{motion} {gravity}: {blockage}");
+        let warnings = estimate.warnings.join("\n");
+        assert!(warnings.contains("blocks 35 % of the cross-section"), "{warnings}");
+    }
+    let across = case("", "", sideways).blockage.unwrap();
+    assert!((across - along_z / 4.0).abs() < 1e-9, "{across}");
+    assert_eq!(case("", "motion = \"fixed\"", none).blockage, None);
+}
+
+#[test]
 fn refinement_is_not_advised_for_grains_that_float_in_a_free_surface() {
     let floating = PAIR
         .replace("\"1500 kg/m3\"", "600")

@@ -1,5 +1,6 @@
 //! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall time.
 
+use super::blockage::blockage;
 use super::settling::{expected_time_step, galileo, impact_speed, is_free, landing_time};
 use super::settling::{settling_reynolds, smallest_diameter, terminal_speed};
 use crate::RunPlan;
@@ -69,7 +70,8 @@ pub struct Estimate {
     /// Relative error of the drag expected on this grid at the larger Reynolds number, see
     /// [`drag_error`].
     pub drag_error: Option<f64>,
-    /// Blocked part of the cross-section normal to gravity, largest grain.
+    /// Part of the cross-section that the largest grain blocks, normal to gravity or, if none
+    /// settles, to the motion of grains or fluid.
     pub blockage: Option<f64>,
     /// Duration of a contact of two equal grains, shortest [s].
     pub contact_time_s: Option<f64>,
@@ -156,7 +158,7 @@ impl Estimate {
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
                 .then(|| shortest_axis(setup) / largest_edge(setup)),
             drag_error: None,
-            blockage: blockage(setup),
+            blockage: blockage(setup, expected_end_s),
             contact_time_s,
             contact_substeps,
             contact_share: contact_s / (step_s + contact_s).max(f64::MIN_POSITIVE),
@@ -250,17 +252,6 @@ fn contact_time(setup: &Setup) -> Option<f64> {
     };
     let times = setup.grains.iter().map(of);
     times.reduce(f64::min).filter(|time| touches && time.is_finite())
-}
-
-/// Returns the cross-section of the largest grain over that of the box, normal to gravity.
-fn blockage(setup: &Setup) -> Option<f64> {
-    let diameters = setup.grains.iter().map(|g| g.shape.equivalent_diameter());
-    let largest = diameters.fold(0.0, f64::max);
-    let down = setup.gravity.try_normalize()?;
-    setup.fluid.as_ref().filter(|_| largest > 0.0)?;
-    let extent = setup.mesh.extent();
-    let along = (extent * down.abs()).element_sum();
-    Some(std::f64::consts::FRAC_PI_4 * largest * largest * along / extent.element_product())
 }
 
 #[cfg(test)]
