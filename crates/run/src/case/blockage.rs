@@ -26,9 +26,11 @@ pub(super) fn blockage(setup: &Setup, end: f64) -> Option<f64> {
 }
 
 /// Returns the unit vector along which grains and fluid are expected to pass each other, until
-/// `end` [s]: that of gravity if a grain moves freely; else that of the first of these that is not
-/// zero: the fastest motion of a grain, prescribed or at the start, the fastest inflow, the velocity
-/// of the fluid at the start, its largest body acceleration, and gravity. Initial velocities by a
+/// `end` [s].
+///
+/// It is that of gravity if a grain moves freely; else that of the first of these that is not zero:
+/// the fastest motion of a grain, prescribed or at the start, the fastest inflow, the velocity of
+/// the fluid at the start, its largest body acceleration, and gravity. Initial velocities by a
 /// formula of space are left out.
 pub(super) fn flow_direction(setup: &Setup, end: f64) -> Option<DVec3> {
     let fluid = setup.fluid?;

@@ -9,8 +9,8 @@
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
 //! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`,
-//! `close_packing` -> `packing`, `placement`, `shapes` -> `blockage` -> `settling`, `expect` -> `raw` -> `source`
-//! -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
+//! `close_packing` -> `packing`, `placement`, `shapes` -> `blockage` -> `settling`, `expect` ->
+//! `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
 
 mod blockage;
 mod branch;
