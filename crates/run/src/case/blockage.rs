@@ -4,10 +4,10 @@ use std::f64::consts::FRAC_PI_4;
 
 use glam::DVec3;
 
+use grainwake_solver::dem::MotionConstraint;
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::sim::Setup;
 
-use super::settling::is_free;
 use super::time_scale::spread_times;
 
 /// Times at which formulas are evaluated.
@@ -16,13 +16,18 @@ const TIMES: usize = 200;
 /// Returns the cross-section of the largest grain over that of the box, normal to
 /// [`flow_direction`]; none without fluid, without grains or if nothing moves.
 pub(super) fn blockage(setup: &Setup, end: f64) -> Option<f64> {
+    setup.fluid.as_ref().filter(|_| !setup.grains.is_empty())?;
+    Some(blockage_along(setup, flow_direction(setup, end)?))
+}
+
+/// Returns the cross-section of the largest grain over that of the box, normal to the unit vector
+/// `direction`.
+pub(super) fn blockage_along(setup: &Setup, direction: DVec3) -> f64 {
     let diameters = setup.grains.iter().map(|g| g.shape.equivalent_diameter());
     let largest = diameters.fold(0.0, f64::max);
-    setup.fluid.as_ref().filter(|_| largest > 0.0)?;
-    let direction = flow_direction(setup, end)?;
     let extent = setup.mesh.extent();
     let along = (extent * direction.abs()).element_sum();
-    Some(FRAC_PI_4 * largest * largest * along / extent.element_product())
+    FRAC_PI_4 * largest * largest * along / extent.element_product()
 }
 
 /// Returns the unit vector along which grains and fluid are expected to pass each other, until
@@ -44,7 +49,7 @@ pub(super) fn flow_direction(setup: &Setup, end: f64) -> Option<DVec3> {
     let prescribed = motions.flat_map(|formula| times().map(|time| formula.at(&[time])));
     let at_start = setup.grains.iter().map(|grain| grain.velocity);
     let accelerations = times().filter_map(|time| given.body_acceleration(time));
-    let settles = setup.grains.iter().any(is_free);
+    let settles = setup.grains.iter().any(|grain| grain.translation == MotionConstraint::Free);
     let vectors = [
         if settles { setup.gravity } else { DVec3::ZERO },
         fastest(at_start.chain(prescribed)),

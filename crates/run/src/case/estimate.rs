@@ -1,7 +1,8 @@
 //! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall time.
 
 use super::blockage::blockage;
-use super::settling::{expected_time_step, galileo, impact_speed, is_free, landing_time};
+use super::settling::{LONGER_UP_TO, expected_time_step, galileo, impact_speed, is_free};
+use super::settling::{is_limited_beside_held_grains, landing_time};
 use super::settling::{settling_reynolds, smallest_diameter, terminal_speed};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
@@ -111,7 +112,9 @@ impl Estimate {
         let allowed = expected_time_step(setup, speed.unwrap_or(0.0), expected_end_s);
         // Whole numbers of equal steps lead from output to output.
         let interval = plan.intervals().fold(f64::INFINITY, f64::min);
-        let steps_of_interval = (interval / allowed - 1e-9).ceil().max(1.0);
+        let held = is_limited_beside_held_grains(setup, allowed);
+        let longest = if held { LONGER_UP_TO * allowed } else { allowed };
+        let steps_of_interval = (interval / longest - 1e-9).ceil().max(1.0);
         let time_step_s = if interval.is_finite() { interval / steps_of_interval } else { allowed };
         let steps = (expected_end_s / time_step_s).ceil().max(1.0);
 

@@ -9,7 +9,7 @@
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
 //! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`,
-//! `close_packing` -> `packing`, `placement`, `shapes` -> `blockage` -> `settling`, `expect` ->
+//! `close_packing` -> `packing`, `placement`, `shapes` -> `settling`, `expect` -> `blockage` ->
 //! `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
 
 mod blockage;

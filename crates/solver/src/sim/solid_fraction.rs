@@ -69,8 +69,8 @@ impl Simulation {
         sum / count as f64
     }
 
-    /// Grains and periodic images whose surface may cut a cell with these edges [m], with the vector
-    /// from centroid to cell centre [m]; `None` if the cell lies inside a grain.
+    /// Grains and images whose surface may cut a cell with these edges [m], with the vector from
+    /// centroid to cell centre [m]; `None` if the cell lies inside a grain.
     fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Option<Vec<(&Grain, DVec3)>> {
         let mesh = &self.setup.mesh;
         let centre = mesh.position([0.5; 3], cell.map(|i| i + 1));
