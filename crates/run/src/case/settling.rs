@@ -14,8 +14,7 @@ use super::blockage::blockage_along;
 use super::time_scale::{resolved_step, spread_times};
 
 /// Speed of the fluid beside a grain, as the sum over the axes that counts in the CFL number, over
-/// that of the grain relative to the fluid far away: 1.4 in settling, and 1.39 behind an inflow past
-/// a fixed sphere at Re 60.
+/// that of the grain relative to the fluid far away (1.39 in an inflow past a fixed sphere, Re 60).
 const BESIDE_GRAIN: f64 = 1.4;
 /// Largest blockage by which the speed of the fluid beside a grain is raised.
 const MOST_BLOCKAGE: f64 = 0.5;
@@ -242,9 +241,10 @@ fn step_at(setup: &Setup) -> impl Fn(f64) -> f64 {
     }
 }
 
-/// Returns the largest speed of the fluid beside grains that are held in an inflow or in a fluid that
-/// moves at the start, as the sum over the axes that counts in the CFL number [m/s]; zero if there
-/// are none. The narrowed cross-section raises it further.
+/// Returns the largest speed of the fluid beside grains that are held in an inflow, or in a fluid
+/// that moves at the start, as the sum over the axes that counts in the CFL number [m/s].
+///
+/// It is zero without such grains. The narrowed cross-section raises it.
 fn speed_beside_held_grains(setup: &Setup) -> f64 {
     let Some(fluid) = &setup.fluid else { return 0.0 };
     let inflows = setup.boundaries.0.as_flattened().iter().filter_map(|side| match side {

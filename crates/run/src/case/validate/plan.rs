@@ -69,9 +69,10 @@ const MANY_STEPS: f64 = 5.0;
 /// flow past held grains limits them, and `given` is the shortest interval in the case file [s].
 ///
 /// An interval slightly longer than a step would halve the steps. Past held grains the speed of the
-/// flow depends on shape and Reynolds number, so there an interval has several steps. A whole number
-/// of intervals fits into the given one, or of given ones into the interval: a short step between
-/// their times would be followed by others, since steps grow slowly.
+/// flow depends on shape and Reynolds number, so there an interval has several steps.
+///
+/// A whole number of intervals fits into the given one, or of given ones into the interval: a short
+/// step between their times would be followed by others, since steps grow slowly.
 fn default_tables(end: f64, step: f64, beside_held: bool, given: Option<f64>) -> f64 {
     let interval = end / 400.0;
     if interval >= MANY_STEPS * step {
