@@ -79,6 +79,12 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         Ending::Finished(summary) => {
             if !args.no_report {
                 draw(args, &out);
+            } else if !args.quiet && out.join("report.html").exists() {
+                tell!(
+                    "note: report.html shows an earlier state of the run; draw it again with \
+                     `grainwake report {}`",
+                    out.display()
+                );
             }
             conclude(args, &case, &summary, &out)
         }

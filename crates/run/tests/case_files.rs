@@ -475,6 +475,43 @@ fn the_speed_of_an_inflow_counts_for_the_resolution() {
 }
 
 #[test]
+fn blockage_is_that_of_the_flow_past_the_grain_with_and_without_gravity() {
+    let case = |boundaries: &str, motion: &str, more: &str| {
+        good(&format!(
+            "{more}\n[fluid]\ndensity = 1000\nviscosity = \"10 mPa s\"\n\
+             [domain]\nsize = [\"3 mm\", \"3 mm\", \"12 mm\"]\ncell_size = \"0.25 mm\"\n\
+             boundaries = {{ {boundaries} }}\n[time]\nend = \"0.02 s\"\n\
+             [[grain]]\nshape = {{ kind = \"sphere\", diameter = \"2 mm\" }}\ndensity = 1000\n\
+             position = [\"1.5 mm\", \"1.5 mm\", \"6 mm\"]\n{motion}"
+        ))
+        .estimate(1)
+    };
+    let none = "gravity = [0, 0, 0]";
+    let through = "z = [\"outflow\", { kind = \"inflow\", velocity = [0, 0, -0.1] }]";
+    let towed = "motion = { velocity = [0, 0, \"-0.1 m/s\"], angular_velocity = \"fixed\" }";
+    let swung = "motion = { velocity = { formula = [0, 0, \"0.1*sin(600*t)\"] } }";
+    let sideways = "gravity = [9.81, 0, 0]";
+    let along_z = std::f64::consts::PI / 9.0;
+    for (boundaries, motion, gravity) in [
+        ("", towed, none),
+        ("", swung, none),
+        (through, "motion = \"fixed\"", none),
+        (through, "", none),
+        (through, "motion = \"fixed\"", sideways),
+        ("", "", ""),
+    ] {
+        let estimate = case(boundaries, motion, gravity);
+        let blockage = estimate.blockage.expect("a blockage");
+        assert!((blockage - along_z).abs() < 1e-9, "{motion} {gravity}: {blockage}");
+        let warnings = estimate.warnings.join("\n");
+        assert!(warnings.contains("blocks 35 % of the cross-section"), "{warnings}");
+    }
+    let across = case("", "", sideways).blockage.unwrap();
+    assert!((across - along_z / 4.0).abs() < 1e-9, "{across}");
+    assert_eq!(case("", "motion = \"fixed\"", none).blockage, None);
+}
+
+#[test]
 fn refinement_is_not_advised_for_grains_that_float_in_a_free_surface() {
     let floating = PAIR
         .replace("\"1500 kg/m3\"", "600")
@@ -1327,6 +1364,50 @@ fn whole_numbers_of_steps_lead_to_each_output() {
     let text = format!("{PAIR}\n[output]\ntables = {interval:?}\nslices = 0\nsurfaces = 0\n");
     let estimate = good(&text).estimate(1);
     assert!((estimate.time_step_s - 0.5 * interval).abs() < 1e-12, "{}", estimate.time_step_s);
+}
+
+/// The flow beside a fixed grain is faster than the inflow: the runs take 468 and 161 steps.
+#[test]
+fn the_flow_beside_a_fixed_grain_counts_in_steps_and_default_outputs() {
+    let case = |output: &str, end: &str| {
+        good(&format!(
+            "gravity = [0, 0, 0]\n\
+             [fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"\n\
+             initial_velocity = [\"30 mm/s\", 0, 0]\n\
+             [domain]\nsize = [\"16 mm\", \"8 mm\", \"8 mm\"]\ncell_size = \"0.25 mm\"\n\
+             boundaries = {{ x = [{{ kind = \"inflow\", velocity = [\"30 mm/s\", 0, 0] }}, \
+             \"outflow\"], y = \"slip\", z = \"slip\" }}\n\
+             [time]\nend = \"{end}\"\n[output]\n{output}\n\
+             [[grain]]\nshape = {{ kind = \"sphere\", diameter = \"2 mm\" }}\ndensity = 1000\n\
+             position = [\"5 mm\", \"4 mm\", \"4 mm\"]\nmotion = \"fixed\""
+        ))
+    };
+    let steps = |case: &Case| case.estimate(1).steps as f64;
+    let plain = case("", "1 s");
+    assert!((steps(&plain) / 468.0 - 1.0).abs() < 0.15, "{}", steps(&plain));
+    let free = steps(&case("tables = 0\nslices = 0\nsurfaces = 0", "1 s"));
+    assert!(steps(&plain) < 1.08 * free, "{} instead of {free}", steps(&plain));
+    // An interval of several steps: one step more costs little.
+    assert!(plain.job().plan.tables > 4.5 / free, "{}", plain.job().plan.tables);
+    // Many rows: the default remains.
+    assert_eq!(case("", "10 s").job().plan.tables, 0.025);
+}
+
+/// Short steps between the times of two outputs would be followed by others.
+#[test]
+fn default_tables_have_the_times_of_a_given_output() {
+    let tables = |contacts: &str| {
+        let output = format!("[output]\ncontacts = \"{contacts}\"");
+        let dry = PAIR.replace("[fluid]\ndensity = 1000\nviscosity = \"1 mPa s\"", "");
+        assert!(dry != PAIR);
+        let text = format!("{}\n{output}", dry.replace("end = \"1 s\"", "end = \"0.2 s\""));
+        good(&text).job().plan.tables
+    };
+    for (contacts, interval) in [("10 ms", 10e-3), ("11 ms", 11e-3), ("1 ms", 1e-3)] {
+        let ratio = (interval / tables(contacts)).max(tables(contacts) / interval);
+        assert!((ratio - ratio.round()).abs() < 1e-9, "{contacts}: {ratio}");
+        assert!(tables(contacts) <= tables("1 s") * 1.2, "{contacts}");
+    }
 }
 
 /// A default interval slightly longer than a step would halve the steps.

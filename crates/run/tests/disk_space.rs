@@ -98,3 +98,15 @@ fn surfaces_of_many_grains_are_simplified() {
     }
     compare(&text, 0.15);
 }
+
+#[test]
+fn only_a_run_that_writes_full_fields_has_their_folder() {
+    for (output, is_there) in [("fields = 0", false), ("fields = \"5 ms\"", true)] {
+        let text = format!("{WET}[output]\n{output}\n");
+        let case = Case::parse(&text, "case.toml", Path::new(""), &[]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("run");
+        run(case.job(), &out, &Options::default(), &mut Silent).unwrap();
+        assert_eq!(out.join("fields").exists(), is_there, "{output}");
+    }
+}

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use glam::{DQuat, DVec3};
 use grainwake_shape::{Shape, analytic};
 use grainwake_solver::dem::Grain;
-use grainwake_solver::flow::Boundary;
-use grainwake_solver::grid::Mesh;
+use grainwake_solver::flow::{Boundary, FluidParams};
+use grainwake_solver::grid::{Axis, Mesh};
 use grainwake_solver::sim::{Setup, Simulation, StepRule};
 
 const PERIODIC: [Boundary; 2] = [Boundary::Periodic; 2];
@@ -84,4 +84,31 @@ fn grains_that_overlap_are_not_counted_twice() {
     let lens = PI / 12.0 * (4.0 * r + 2.0 * half) * (2.0 * r - 2.0 * half).powi(2);
     let found = solid([14, 12, 12], DVec3::splat(H), WALLS, vec![ball(0.6), ball(0.8)]);
     assert_volume(found, 8.0 / 3.0 * PI * r.powi(3) - lens, "two spheres");
+}
+
+/// A rod longer than a periodic box: each cell has the fraction of all images that reach it.
+#[test]
+fn fractions_of_a_rod_longer_than_a_periodic_box_sum_to_its_volume() {
+    let (radius, length) = (0.5, 9.0);
+    let turn = DQuat::from_rotation_arc(DVec3::X, DVec3::new(0.913, 0.365, 0.18).normalize());
+    let rod = analytic::capsule(radius, length, &Default::default()).unwrap();
+    let mesh = Mesh { cells: [24; 3], spacing: DVec3::splat(0.25), origin: DVec3::ZERO };
+    let setup = Setup::new(mesh)
+        .with_boundaries([PERIODIC; 3])
+        .with_fluid(FluidParams::new(1.0, 0.1))
+        .with_grains(vec![grain(rod, DVec3::splat(3.0), turn)])
+        .with_step(StepRule::Fixed(1e-3));
+    let sim = Simulation::new(setup).unwrap();
+    let cells = (0..24usize.pow(3)).map(|n| [n % 24, n / 24 % 24, n / 576]);
+    let sum: f64 = cells.map(|cell| sim.solid_fraction_at(cell)).sum();
+    let volume = PI * radius * radius * (length + 4.0 / 3.0 * radius);
+    assert_volume(sum * 0.25_f64.powi(3), volume, "rod");
+    // The planes add up to the volume too; that of x = 5.9 cuts the rod twice.
+    let planes = (0..240).map(|n| 0.025 * (f64::from(n) + 0.5));
+    let areas = planes.map(|x| 36.0 * sim.sample_plane(Axis::X, x).unwrap().solid_fraction);
+    assert_volume(0.025 * areas.sum::<f64>(), volume, "planes across the rod");
+    // Far from its ends the section of a cylinder is pi r^2 over the cosine of its slope.
+    let section = PI * radius * radius / (turn * DVec3::X).x;
+    let twice = 36.0 * sim.sample_plane(Axis::X, 5.9).unwrap().solid_fraction;
+    assert!((twice / (2.0 * section) - 1.0).abs() < 0.02, "{twice}, not twice {section}");
 }

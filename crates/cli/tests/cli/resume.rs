@@ -614,6 +614,24 @@ fn an_end_before_the_checkpoint_is_refused() {
 }
 
 #[test]
+fn a_report_of_an_earlier_state_is_named_if_none_is_drawn() {
+    let (folder, case) = folder_with(DRY);
+    let out = folder.path().join("run");
+    run(&case, &out, &["--set", "time.end=10 ms", "--no-report"]).success();
+    std::fs::write(out.join("report.html"), "old").unwrap();
+    let messages = |more: &[&str]| {
+        let mut command = grainwake();
+        let done = command.arg("run").arg(&case).arg("-o").arg(&out).args(more).assert().success();
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let resumed = messages(&["--set", "time.end=20 ms", "--resume", "--no-report"]);
+    assert!(resumed.contains("report.html shows an earlier state"), "{resumed}");
+    // A run that starts again has no report.
+    let again = messages(&["--set", "time.end=10 ms", "--force", "--no-report"]);
+    assert!(!again.contains("report.html"), "{again}");
+}
+
+#[test]
 fn a_run_that_finishes_after_a_failure_is_not_shown_as_failed() {
     let (folder, case) = folder_with(DRY);
     let out = folder.path().join("run");

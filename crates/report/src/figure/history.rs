@@ -155,7 +155,8 @@ pub fn diagnostics(scene: &Scene) -> Option<Figure> {
         sentences.push(format!(
             "Change of the momentum of fluid, grains and walls in a step that no force accounts \
              for, relative to the mass of the fluid times its largest velocity, at most {} in the \
-             rows of the table.",
+             rows of the table; above round-off with free grains lighter than the fluid or a \
+             refined box.",
             short(peak(&residual))
         ));
         let curve = Series::new(residual, style::PURPLE);

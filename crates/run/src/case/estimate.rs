@@ -1,6 +1,8 @@
 //! Estimates before a run: Galileo number, settling speed, steps, memory, disk space, wall time.
 
-use super::settling::{expected_time_step, galileo, impact_speed, is_free, landing_time};
+use super::blockage::blockage;
+use super::settling::{LONGER_UP_TO, expected_time_step, galileo, impact_speed, is_free};
+use super::settling::{is_limited_beside_held_grains, landing_time};
 use super::settling::{settling_reynolds, smallest_diameter, terminal_speed};
 use crate::RunPlan;
 use crate::memory::{self, surface_cells};
@@ -69,7 +71,8 @@ pub struct Estimate {
     /// Relative error of the drag expected on this grid at the larger Reynolds number, see
     /// [`drag_error`].
     pub drag_error: Option<f64>,
-    /// Blocked part of the cross-section normal to gravity, largest grain.
+    /// Part of the cross-section that the largest grain blocks, normal to gravity or, if none
+    /// settles, to the motion of grains or fluid.
     pub blockage: Option<f64>,
     /// Duration of a contact of two equal grains, shortest [s].
     pub contact_time_s: Option<f64>,
@@ -109,7 +112,9 @@ impl Estimate {
         let allowed = expected_time_step(setup, speed.unwrap_or(0.0), expected_end_s);
         // Whole numbers of equal steps lead from output to output.
         let interval = plan.intervals().fold(f64::INFINITY, f64::min);
-        let steps_of_interval = (interval / allowed - 1e-9).ceil().max(1.0);
+        let held = is_limited_beside_held_grains(setup, allowed);
+        let longest = if held { LONGER_UP_TO * allowed } else { allowed };
+        let steps_of_interval = (interval / longest - 1e-9).ceil().max(1.0);
         let time_step_s = if interval.is_finite() { interval / steps_of_interval } else { allowed };
         let steps = (expected_end_s / time_step_s).ceil().max(1.0);
 
@@ -156,7 +161,7 @@ impl Estimate {
             cells_across_shortest_axis: (fluid.is_some() && smallest.is_finite())
                 .then(|| shortest_axis(setup) / largest_edge(setup)),
             drag_error: None,
-            blockage: blockage(setup),
+            blockage: blockage(setup, expected_end_s),
             contact_time_s,
             contact_substeps,
             contact_share: contact_s / (step_s + contact_s).max(f64::MIN_POSITIVE),
@@ -250,17 +255,6 @@ fn contact_time(setup: &Setup) -> Option<f64> {
     };
     let times = setup.grains.iter().map(of);
     times.reduce(f64::min).filter(|time| touches && time.is_finite())
-}
-
-/// Returns the cross-section of the largest grain over that of the box, normal to gravity.
-fn blockage(setup: &Setup) -> Option<f64> {
-    let diameters = setup.grains.iter().map(|g| g.shape.equivalent_diameter());
-    let largest = diameters.fold(0.0, f64::max);
-    let down = setup.gravity.try_normalize()?;
-    setup.fluid.as_ref().filter(|_| largest > 0.0)?;
-    let extent = setup.mesh.extent();
-    let along = (extent * down.abs()).element_sum();
-    Some(std::f64::consts::FRAC_PI_4 * largest * largest * along / extent.element_product())
 }
 
 #[cfg(test)]

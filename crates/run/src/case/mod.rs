@@ -9,9 +9,10 @@
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
 //! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`,
-//! `close_packing` -> `packing`, `placement`, `shapes` -> `settling`, `expect` -> `raw` -> `source`
-//! -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
+//! `close_packing` -> `packing`, `placement`, `shapes` -> `settling`, `expect` -> `blockage` ->
+//! `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
 
+mod blockage;
 mod branch;
 mod close_packing;
 mod continuation;

@@ -10,8 +10,17 @@ use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::events::EventParams;
 use grainwake_solver::sim::{Prescription, Setup, StepRule};
 
+use super::blockage::blockage_along;
 use super::time_scale::{resolved_step, spread_times};
 
+/// Speed of the fluid beside a grain, as the sum over the axes that counts in the CFL number, over
+/// that of the grain relative to the fluid far away (1.39 in an inflow past a fixed sphere, Re 60).
+const BESIDE_GRAIN: f64 = 1.4;
+/// Largest blockage by which the speed of the fluid beside a grain is raised.
+const MOST_BLOCKAGE: f64 = 0.5;
+/// Part of its limit up to which the clock takes longer steps again, after the flow past a held
+/// grain was fastest in the first steps.
+pub(super) const LONGER_UP_TO: f64 = 0.95;
 /// Largest density of a grain [kg/m3].
 pub(super) const HEAVIEST: f64 = 1e9;
 
@@ -208,7 +217,7 @@ fn step_at(setup: &Setup) -> impl Fn(f64) -> f64 {
     let h: Vec<f64> = setup.mesh.resolved_axes().map(|axis| spacing[axis]).collect();
     let smallest = h.iter().copied().fold(f64::INFINITY, f64::min);
     let inverse_squares: f64 = h.iter().map(|h| h.powi(-2)).sum();
-    // Speed of the fluid without the grains.
+    // Speed of the fluid without the grains, and beside those that are held in its flow.
     let given = setup.fluid.as_ref().map_or(0.0, |fluid| {
         let sides = setup.boundaries.0.iter().flatten().map(|side| match side {
             Boundary::Wall { velocity } | Boundary::Inflow { velocity } => {
@@ -220,16 +229,50 @@ fn step_at(setup: &Setup) -> impl Fn(f64) -> f64 {
             .unwrap_or(fluid.initial_velocity.abs().element_sum());
         sides.fold(initial, f64::max)
     });
+    let given = given.max(speed_beside_held_grains(setup));
     let (rule, nu) = (setup.step, setup.fluid.map(|fluid| fluid.kinematic_viscosity));
     move |speed| match (rule, nu) {
         (StepRule::Fixed(step), _) => step,
         (StepRule::Limits { max_step, .. }, None) => max_step,
-        (StepRule::Limits { cfl, viscous, max_step }, Some(nu)) => {
-            // The fluid beside a settling grain exceeds the speed of the grain.
-            (cfl * smallest / given.max(1.4 * speed))
-                .min(viscous / (nu * inverse_squares))
-                .min(max_step)
-        }
+        (StepRule::Limits { cfl, viscous, max_step }, Some(nu)) => (cfl * smallest
+            / given.max(BESIDE_GRAIN * speed))
+        .min(viscous / (nu * inverse_squares))
+        .min(max_step),
+    }
+}
+
+/// Returns the largest speed of the fluid beside grains that are held in an inflow, or in a fluid
+/// that moves at the start, as the sum over the axes that counts in the CFL number [m/s].
+///
+/// It is zero without such grains. The narrowed cross-section raises it.
+fn speed_beside_held_grains(setup: &Setup) -> f64 {
+    let Some(fluid) = &setup.fluid else { return 0.0 };
+    let inflows = setup.boundaries.0.as_flattened().iter().filter_map(|side| match side {
+        Boundary::Inflow { velocity } => Some(*velocity),
+        _ => None,
+    });
+    let streams = inflows.chain([fluid.initial_velocity]);
+    let moving = streams.filter_map(|stream| Some((stream, stream.try_normalize()?)));
+    let beside = moving.flat_map(|(stream, direction)| {
+        let open = 1.0 - blockage_along(setup, direction).min(MOST_BLOCKAGE);
+        setup.grains.iter().filter_map(move |grain| match grain.translation {
+            MotionConstraint::Prescribed(velocity) => {
+                Some(BESIDE_GRAIN / open * (stream - velocity).abs().element_sum())
+            }
+            MotionConstraint::Free => None,
+        })
+    });
+    beside.fold(0.0, f64::max)
+}
+
+/// Returns whether the flow past held grains limits the `step` [s].
+pub(super) fn is_limited_beside_held_grains(setup: &Setup, step: f64) -> bool {
+    let spacing = setup.finest_spacing();
+    let smallest = setup.mesh.resolved_axes().map(|axis| spacing[axis]).fold(f64::MAX, f64::min);
+    let speed = speed_beside_held_grains(setup);
+    match setup.step {
+        StepRule::Limits { cfl, .. } => cfl * smallest <= step * speed * (1.0 + 1e-9),
+        StepRule::Fixed(_) => false,
     }
 }
 

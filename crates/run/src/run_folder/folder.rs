@@ -197,7 +197,7 @@ pub(crate) fn clear(folder: &Path) -> Result<(), RunError> {
         provenance::FILE,
         checkpoint::REMOVAL,
     ];
-    let folders = [probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
+    let folders = [vtk_output::FULL_FIELDS, probes::FOLDER, contacts::FOLDER, "shapes", "figures"];
     for name in vtk_output::FOLDERS.iter().chain(&folders) {
         remove_if_there(&folder.join(name), disk::remove_folder)?;
     }
@@ -229,7 +229,8 @@ pub(crate) fn create(folder: &Path) -> Result<(), RunError> {
     for path in std::iter::once(PathBuf::from(folder)).chain(inner()) {
         disk::create_folder(&path).context("create", &path)?;
     }
-    let optional = [probes::FOLDER, contacts::FOLDER, "figures"].map(|name| folder.join(name));
+    let optional = [vtk_output::FULL_FIELDS, probes::FOLDER, contacts::FOLDER, "figures"];
+    let optional = optional.map(|name| folder.join(name));
     let optional = optional.into_iter().filter(|path| path.is_dir());
     for path in std::iter::once(PathBuf::from(folder)).chain(inner()).chain(optional) {
         let entries = std::fs::read_dir(&path).context("read", &path)?;

@@ -10,7 +10,7 @@ use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{CELL_FIELDS, SAME_TIME, Setup};
 
 use super::scaled::ScaledColumns;
-use super::surfaces::{MAX_TRIANGLES, MERGED_CELLS};
+use super::surfaces::{MAX_TRIANGLES, MERGED_PER_SQUARE, merged_edge};
 use crate::plan::{ProbePlace, RunPlan};
 
 /// Bytes of a number in a table with its separator, mean of the tables of the studies.
@@ -22,8 +22,6 @@ const BYTES_PER_TRIANGLE: f64 = 20.0;
 const SPHERE_POINTS: f64 = 3458.0;
 /// Points of a sampled surface over its area in squares of the grid (grains of the studies).
 const POINTS_PER_SQUARE: f64 = 1.8;
-/// Points of a simplified surface over its area in faces of the cubes (rocks 1.35, spheres 1.2).
-const MERGED_PER_SQUARE: f64 = 1.3;
 /// Numbers of the state per cell, ghosts included.
 const NUMBERS_PER_CELL: f64 = 7.0;
 /// Bytes of the state of a grain with few contacts.
@@ -98,7 +96,7 @@ fn surface_bytes(setup: &Setup) -> f64 {
         if 2.0 * points * count as f64 <= MAX_TRIANGLES as f64 {
             return points;
         }
-        let faces = squares(shape.equivalent_diameter() / MERGED_CELLS);
+        let faces = squares(merged_edge(shape, count));
         points.min(MERGED_PER_SQUARE * faces)
     };
     let all: f64 = setup.grains.iter().map(|grain| points(&grain.shape)).sum();

@@ -14,8 +14,10 @@ use super::surfaces::Surfaces;
 use crate::error::{Context, RunError};
 use crate::plan::{Plane, PlanePosition};
 
-/// Subfolders of the VTK files.
-pub const FOLDERS: [&str; 3] = ["slices", "fields", "grains"];
+/// Subfolders of the VTK files that every run has.
+pub const FOLDERS: [&str; 2] = ["slices", "grains"];
+/// Subfolder of the full fields, in runs that write them.
+pub const FULL_FIELDS: &str = "fields";
 
 /// Writer of the VTK files of a run.
 pub struct VtkOutput {
@@ -56,7 +58,9 @@ impl VtkOutput {
         if !self.has_fluid {
             return Ok(Vec::new());
         }
-        let file = format!("fields/fields_{tag}.vti");
+        let folder = run.join(FULL_FIELDS);
+        disk::create_folder(&folder).context("create", &folder)?;
+        let file = format!("{FULL_FIELDS}/fields_{tag}.vti");
         write_image(&run.join(&file), sim, [0; 3], sim.mesh().cells)?;
         Ok(vec![Entry { time: sim.time(), group: "fields".into(), file }])
     }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::Simulation;
 use super::probe::SampledGrid;
-use super::solid_fraction::{SUBCELLS, fraction_within};
+use super::solid_fraction::{SUBCELLS, fraction_within, images};
 use crate::dem::Grain;
 use crate::grid::Axis;
 
@@ -121,15 +121,26 @@ impl Simulation {
 
     /// Adds the cross-section of a grain and of its periodic images with a plane.
     fn add_cross_section(&self, faces: &mut SolidFaces, grain: &Grain, normal: usize, at: f64) {
-        let (mesh, enclosure) = (&self.setup.mesh, self.setup.enclosure());
-        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
         let mut to_plane = DVec3::ZERO;
         to_plane[normal] = at - grain.pose.position[normal];
-        let height = enclosure.nearest_image(to_plane)[normal];
+        let height = self.setup.enclosure().nearest_image(to_plane)[normal];
         let radius = grain.shape.bounding_radius();
-        if height.abs() > radius {
-            return;
+        for height in images(height, self.image_period(normal), radius) {
+            self.add_section_of_image(faces, grain, normal, height);
         }
+    }
+
+    /// Adds the cross-sections of a grain with a plane at `height` [m] above its centroid, or above
+    /// the centroid of an image, and of the images in the directions of the plane.
+    fn add_section_of_image(
+        &self,
+        faces: &mut SolidFaces,
+        grain: &Grain,
+        normal: usize,
+        height: f64,
+    ) {
+        let (mesh, radius) = (&self.setup.mesh, grain.shape.bounding_radius());
+        let [a, b] = [(normal + 1) % 3, (normal + 2) % 3];
         let reach = (radius * radius - height * height).sqrt();
         // An axis of one cell is evaluated in its middle plane.
         let resolved = [a, b].map(|axis| mesh.is_resolved(axis));

@@ -20,6 +20,25 @@ pub(super) fn fraction_within(grain: &Grain, lever_arm: DVec3, edges: DVec3, thi
     (0.5 - distance / width).clamp(0.0, 1.0)
 }
 
+/// Returns the images of `separation` [m], a multiple of `period` [m] apart, whose magnitude is at
+/// most `reach` [m]; without a period `separation` itself.
+pub(super) fn images(
+    separation: f64,
+    period: Option<f64>,
+    reach: f64,
+) -> impl Iterator<Item = f64> + Clone {
+    let (first, period, counts) = match period {
+        Some(period) => {
+            let nearest = separation - (separation / period).round() * period;
+            let count = |end: f64| (end - nearest) / period;
+            (nearest, period, count(-reach).ceil() as i64..=count(reach).floor() as i64)
+        }
+        None => (separation, 0.0, 0..=0),
+    };
+    let images = counts.map(move |count| first + count as f64 * period);
+    images.filter(move |image| image.abs() <= reach)
+}
+
 impl Simulation {
     /// Solid fraction of cell (i, j, k), counted from 0. A cell near a surface is divided into
     /// sub-cells, and each of these is cut by the plane of the nearest surface.
@@ -50,34 +69,42 @@ impl Simulation {
         sum / count as f64
     }
 
-    /// Grains whose surface may cut a cell with these edges [m], with the vector from centroid to
-    /// cell centre [m]; `None` if the cell lies inside a grain.
+    /// Grains and images whose surface may cut a cell with these edges [m], with the vector from
+    /// centroid to cell centre [m]; `None` if the cell lies inside a grain.
     fn grains_near(&self, cell: [usize; 3], edge: DVec3) -> Option<Vec<(&Grain, DVec3)>> {
         let mesh = &self.setup.mesh;
         let centre = mesh.position([0.5; 3], cell.map(|i| i + 1));
-        let extent = mesh.extent();
+        let periods = [0, 1, 2].map(|axis| self.image_period(axis));
         let mut near = Vec::new();
         for grain in &self.setup.grains {
-            let mut lever_arm = centre - grain.pose.position;
-            for axis in 0..3 {
-                if self.setup.boundaries.is_periodic(axis) && mesh.is_resolved(axis) {
-                    lever_arm[axis] -= (lever_arm[axis] / extent[axis]).round() * extent[axis];
-                }
-            }
             let reach = grain.shape.bounding_radius() + mesh.spacing.length();
-            if lever_arm.length_squared() > reach * reach {
-                continue;
-            }
             let to_body = grain.pose.orientation.conjugate();
-            let (distance, _) = grain.shape.distance_and_gradient(to_body * lever_arm);
-            // From the centre to a corner, the distance changes by at most half the diagonal.
-            if distance <= -0.5 * edge.length() {
-                return None;
-            }
-            if distance < 0.5 * edge.length() {
-                near.push((grain, lever_arm));
+            let [x, y, z] = [0, 1, 2].map(|axis| {
+                let separation = centre[axis] - grain.pose.position[axis];
+                images(separation, periods[axis], reach)
+            });
+            let (xy, reach_squared) =
+                (x.flat_map(|x| y.clone().map(move |y| (x, y))), reach * reach);
+            let levers = xy.flat_map(|(x, y)| z.clone().map(move |z| DVec3::new(x, y, z)));
+            for lever_arm in levers.filter(|lever| lever.length_squared() <= reach_squared) {
+                let (distance, _) = grain.shape.distance_and_gradient(to_body * lever_arm);
+                // From the centre to a corner, the distance changes by at most half the diagonal.
+                if distance <= -0.5 * edge.length() {
+                    return None;
+                }
+                if distance < 0.5 * edge.length() {
+                    near.push((grain, lever_arm));
+                }
             }
         }
         Some(near)
+    }
+
+    /// Distance of the images of a grain along an axis [m]; none along an axis that is not periodic
+    /// or has one cell.
+    pub(super) fn image_period(&self, axis: usize) -> Option<f64> {
+        let mesh = &self.setup.mesh;
+        let has_images = self.setup.boundaries.is_periodic(axis) && mesh.is_resolved(axis);
+        has_images.then(|| mesh.extent()[axis])
     }
 }

@@ -6,7 +6,9 @@ use super::scales::scales;
 use crate::case::located::Located;
 use crate::case::quantity::{Quantity, Time};
 use crate::case::raw::{RawOutput, RawPlane, RawProbe, RawRun, RawStop, RawTime};
-use crate::case::settling::{default_max_step, floor, settled_time_step};
+use crate::case::settling::{
+    LONGER_UP_TO, default_max_step, floor, is_limited_beside_held_grains, settled_time_step,
+};
 use crate::number_format::{number_of_grains, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint};
@@ -63,11 +65,26 @@ const EXPECTED_STEP: f64 = 0.8;
 /// Number of steps from which a step more or less in an interval of the tables does not matter.
 const MANY_STEPS: f64 = 5.0;
 
-/// Returns the default interval of the tables [s]. One that is slightly longer than a step would
-/// halve the steps.
-fn default_tables(end: f64, step: f64) -> f64 {
+/// Returns the default interval of the tables [s] for steps of about `step` [s]; `beside_held` if a
+/// flow past held grains limits them, and `given` is the shortest interval in the case file [s].
+///
+/// An interval slightly longer than a step would halve the steps. Past held grains the speed of the
+/// flow depends on shape and Reynolds number, so there an interval has several steps.
+///
+/// A whole number of intervals fits into the given one, or of given ones into the interval: a short
+/// step between their times would be followed by others, since steps grow slowly.
+fn default_tables(end: f64, step: f64, beside_held: bool, given: Option<f64>) -> f64 {
     let interval = end / 400.0;
-    if interval < MANY_STEPS * step { multiple_of(step, interval) } else { interval }
+    if interval >= MANY_STEPS * step {
+        return interval;
+    }
+    let least = if beside_held { MANY_STEPS * step } else { step };
+    let interval = multiple_of(step, interval).max(least).min(end);
+    match given {
+        Some(given) if given < interval => multiple_of(given, interval),
+        Some(given) => given / (given / interval - 1e-9).ceil(),
+        None => interval,
+    }
 }
 
 /// Returns the multiple of `unit` that is nearest to `value`, at least one; `value` if `unit` is 0.
@@ -106,9 +123,11 @@ pub(super) fn plan(
     let settled = settled_time_step(setup);
     let by_limits = matches!(setup.step, StepRule::Limits { .. }) && !dry;
     let smallest_step = if by_limits { SMALLEST_STEP * settled } else { 0.0 };
-    let step = if by_limits { EXPECTED_STEP * settled } else { settled };
-    let step = step.min(end);
-    let tables = interval(&mut raw.tables, default_tables(end, step));
+    let beside_held = by_limits && is_limited_beside_held_grains(setup, settled);
+    let part = if beside_held { LONGER_UP_TO } else { EXPECTED_STEP };
+    let step = (if by_limits { part * settled } else { settled }).min(end);
+    let tables = default_tables(end, step, beside_held, shortest_given(raw, raw_probes));
+    let tables = interval(&mut raw.tables, tables);
     let coarse = multiple_of(tables, (end / 40.0).max(step));
     let slices = interval(&mut raw.slices, if dry { 0.0 } else { coarse });
     let surfaces = if slices > 0.0 { slices } else { coarse };
@@ -160,6 +179,18 @@ pub(super) fn plan(
         checkpoint_steps: raw.checkpoint_steps.value,
         checkpoint_keep,
     })
+}
+
+/// Returns the shortest interval of an output in the case file [s].
+fn shortest_given(raw: &RawOutput, probes: &[Located<RawProbe>]) -> Option<f64> {
+    let outputs = [&raw.slices, &raw.surfaces, &raw.contacts, &raw.contact_network];
+    let given = outputs.into_iter().chain(probes.iter().map(|probe| &probe.value.every));
+    given
+        .flatten()
+        .chain([&raw.fields])
+        .map(|value| value.si)
+        .filter(|interval| *interval > 0.0)
+        .reduce(f64::min)
 }
 
 fn stop_rule(check: &mut Checker, raw: &Located<RawStop>, setup: &Setup) -> Stop {

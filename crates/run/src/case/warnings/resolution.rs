@@ -1,11 +1,13 @@
 //! Warnings about resolution and cost.
 
+use crate::case::blockage::flow_direction;
 use crate::case::estimate::{
     Estimate, cells_for_drag_error, drag_error_text, thin_layer_drag_error,
 };
 use crate::case::settling::{is_free, prescribed_speeds, time_step};
 use crate::case::time_scale::resolved_step;
 use crate::number_format::{AXES, quantity};
+use glam::DVec3;
 use grainwake_solver::dem::{ContactLawKind, Grain};
 use grainwake_solver::flow::Boundary;
 use grainwake_solver::immersed::Scheme;
@@ -60,13 +62,14 @@ pub(super) fn resolution_and_cost(setup: &Setup, e: &Estimate) -> Vec<String> {
         }
     }
     if let Some(blockage) = e.blockage.filter(|b| *b > 0.05) {
-        let along = setup.gravity.abs();
-        let vertical =
-            (0..3).find(|axis| along[*axis] > 0.0 && along[*axis] == along.max_element());
-        let closed =
-            (0..3).any(|axis| Some(axis) != vertical && !setup.boundaries.is_periodic(axis));
-        let what =
-            if closed { "the walls slow the grains" } else { "the grain feels its own images" };
+        let along = flow_direction(setup, e.expected_end_s).unwrap_or(DVec3::ZERO).abs();
+        let main = (0..3).find(|axis| along[*axis] > 0.0 && along[*axis] == along.max_element());
+        let closed = (0..3).any(|axis| Some(axis) != main && !setup.boundaries.is_periodic(axis));
+        let what = match (closed, setup.grains.iter().any(is_free)) {
+            (true, true) => "the walls slow the grains",
+            (true, false) => "the sides of the box raise the drag",
+            (false, _) => "the grain feels its own images",
+        };
         found.push(format!("a grain blocks {:.0} % of the cross-section: {what}; widen the box for an unbounded fluid", 100.0 * blockage));
     }
     let wet = setup.fluid.is_some();
