@@ -38,6 +38,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         window,
         corner: (x, top),
         scale,
+        flipped: scene.flipped(),
     });
     let mut drawing = Drawing::new(COLUMN, top + frames[0].height() + 26.0);
     for (i, grain) in grains.iter().enumerate() {
@@ -82,6 +83,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     if grains.len() > 1 && !named.is_empty() {
         caption += &format!(" The letters are at the height of grain {marked}.");
     }
+    caption += &scene.downwards();
     caption += &scene.left_out(&grains);
     if let Some(drift) = largest_drift(scene, &grains, up) {
         caption += &match scene.run.facts.diameter() {

@@ -565,6 +565,39 @@ fn a_grain_that_moves_sideways_shows_its_horizontal_speed() {
     remove(&folder);
 }
 
+#[test]
+fn gravity_along_a_positive_axis_is_shown_downwards() {
+    let folder = fresh::folder("single");
+    flows::single(&folder);
+    let ends = || {
+        // The path of the centre: the last line of many points of the figure.
+        let svg = svg(&render(&folder).unwrap(), "trajectories");
+        let path = svg.split(" d=\"").skip(1).max_by_key(|path| path.len()).unwrap();
+        let path = path.split('"').next().unwrap();
+        let place = |point: &str| point.split(' ').nth(1).unwrap().parse::<f64>().unwrap();
+        let mut points = path.split('L').map(place);
+        (points.next().unwrap(), points.next_back().unwrap())
+    };
+    let (start, end) = ends();
+    assert!(start < end, "the grain moves along -z, which is down");
+    replace(&folder, "case.resolved.toml", "[0, 0, -9.81]", "[0, 0, 9.81]");
+    let (start, end) = ends();
+    assert!(start > end, "now -z is up");
+    let rendered = render(&folder).unwrap();
+    let shown = "Gravity acts along +z, shown downwards.";
+    for (name, words) in [
+        ("trajectories", shown),
+        ("speed", shown),
+        ("vorticity", shown),
+        ("velocity", "Vertical velocity (down, along +z, is negative)"),
+        ("velocity", "−vz  [m/s]"),
+    ] {
+        let said = text_of(&svg(&rendered, name));
+        assert!(said.contains(words), "{name}: {said}");
+    }
+    remove(&folder);
+}
+
 /// Reverses the vertical velocity before `end` [s]; the rows after it are those of a rebound.
 fn rise(folder: &Path, end: f64) {
     edit_rows(folder, |cells| {
