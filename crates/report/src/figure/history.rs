@@ -43,7 +43,10 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     );
     if last_contacts.is_finite() {
         let contacts = curve(contacts, style::GREEN);
-        panels.push(Panel::linear("contacts per grain  [–]", contacts, &[0.0], 70.0));
+        // A count begins at 0, also if there are none.
+        let highest = contacts.iter().flat_map(Series::values).fold(0.0, f64::max);
+        let also = [0.0, if highest > 0.0 { 0.0 } else { 1.0 }];
+        panels.push(Panel::linear("contacts per grain  [–]", contacts, &also, 70.0));
         let last = short(last_contacts);
         caption += &format!(" (c) Mean number of contacts of a grain, {last} at the end.");
     }

@@ -219,7 +219,7 @@ pub fn draw(
                     drawing.label(centre, Anchor::Middle, SMALL, FAINT, "no slice");
                 }
             }
-            let across = (r + 1 == count).then_some(x_name.as_str());
+            let across = (r + 1 == column.sections.len()).then_some(x_name.as_str());
             let up = if c == 0 { z_name.as_str() } else { "" };
             frame.frame(&mut drawing, (across, Some(up)));
         }

@@ -39,7 +39,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         let frames: Vec<&FrameFile> = frames.collect();
         let through = |grain: usize| frames.iter().find(|frame| frame.grain == Some(grain));
         let sections = match scene.features.pair {
-            Some(pair) if through(pair[0]).is_some() => {
+            Some(pair) if pair.iter().any(|grain| through(*grain).is_some()) => {
                 pair.map(|grain| through(grain).and_then(|frame| read(frame))).to_vec()
             }
             _ => vec![frames.first().and_then(|frame| read(frame))],
