@@ -28,13 +28,15 @@ pub struct Axis {
     scale: Scale,
     low: f64,
     high: f64,
+    /// Whether values decrease along the axis.
+    reversed: bool,
     /// Value and label of each tick; minor ticks have an empty label.
     pub ticks: Vec<(f64, String)>,
 }
 
 impl Axis {
     fn new(label: &str, scale: Scale, low: f64, high: f64, ticks: Vec<(f64, String)>) -> Axis {
-        Axis { label: label.to_owned(), scale, low, high, ticks }
+        Axis { label: label.to_owned(), scale, low, high, reversed: false, ticks }
     }
 
     /// Creates a linear axis from `low` to `high` with about `count` round steps; a
@@ -169,6 +171,13 @@ impl Axis {
         self.scale == Scale::Categories
     }
 
+    /// Makes the values decrease along the axis: the larger end is on the left, or below.
+    #[must_use]
+    pub fn reversed(mut self) -> Axis {
+        self.reversed = !self.reversed;
+        self
+    }
+
     /// Replaces the ticks by ticks at `values`.
     #[must_use]
     pub fn with_ticks(mut self, values: &[f64]) -> Axis {
@@ -186,8 +195,8 @@ impl Axis {
         self.high
     }
 
-    /// Returns the position of `value` along the axis, from 0 at the lower to 1 at the upper end;
-    /// `None` if the axis cannot represent it.
+    /// Returns the position of `value` along the axis, from 0 at the lower to 1 at the upper end,
+    /// or from 1 to 0 if the axis is reversed; `None` if the axis cannot represent it.
     pub fn fraction(&self, value: f64) -> Option<f64> {
         let fraction = match self.scale {
             Scale::Linear | Scale::Categories => (value - self.low) / (self.high - self.low),
@@ -196,6 +205,7 @@ impl Axis {
             }
             Scale::Log => return None,
         };
+        let fraction = if self.reversed { 1.0 - fraction } else { fraction };
         fraction.is_finite().then_some(fraction)
     }
 }

@@ -51,6 +51,8 @@ pub struct EqualAspectFrame {
     pub corner: (f64, f64),
     /// Scale [pt/m].
     pub scale: f64,
+    /// Whether the vertical coordinate increases downwards.
+    pub flipped: bool,
 }
 
 impl EqualAspectFrame {
@@ -62,19 +64,22 @@ impl EqualAspectFrame {
     pub fn height(&self) -> f64 {
         self.window.height() * self.scale
     }
+    /// Returns the distance of a height from the upper edge of the window [m].
+    fn depth(&self, y: f64) -> f64 {
+        if self.flipped { y - self.window.low.1 } else { self.window.high.1 - y }
+    }
     /// Returns the position on paper [pt] of a point [m].
     pub fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
         (
             self.corner.0 + (x - self.window.low.0) * self.scale,
-            self.corner.1 + (self.window.high.1 - y) * self.scale,
+            self.corner.1 + self.depth(y) * self.scale,
         )
     }
     /// Returns the point [m] at a position on paper [pt].
     pub fn point(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        (
-            self.window.low.0 + (x - self.corner.0) / self.scale,
-            self.window.high.1 - (y - self.corner.1) / self.scale,
-        )
+        let depth = (y - self.corner.1) / self.scale;
+        let up = if self.flipped { self.window.low.1 + depth } else { self.window.high.1 - depth };
+        (self.window.low.0 + (x - self.corner.0) / self.scale, up)
     }
     /// Returns SVG path data through points [m].
     pub fn path(&self, points: &[(f64, f64)], closed: bool) -> String {
@@ -107,6 +112,7 @@ impl EqualAspectFrame {
         let bottom = y + height;
         ticks::horizontal(drawing, &across, (x, bottom), width, labels.0.is_some());
         let up = axis(low.1, high.1, height, 22.0);
+        let up = if self.flipped { up.reversed() } else { up };
         ticks::vertical(drawing, &up, (x, y), height, labels.1.is_some(), None);
         drawing.outline(x, y, width, height);
         if let Some(label) = labels.0.filter(|label| !label.is_empty()) {
@@ -168,4 +174,23 @@ pub fn outline_style(colour: &str, strength: f64) -> String {
         strength,
         style::HAIR + 0.1
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flipped_frame_has_the_lower_end_on_top() {
+        let window = Window { low: (0.0, 1.0), high: (2.0, 4.0) };
+        let frame = EqualAspectFrame { window, corner: (10.0, 20.0), scale: 5.0, flipped: false };
+        assert_eq!(frame.at((1.0, 4.0)), (15.0, 20.0));
+        let flipped = EqualAspectFrame { flipped: true, ..frame };
+        assert_eq!(flipped.at((1.0, 1.0)), (15.0, 20.0));
+        for frame in [frame, flipped] {
+            assert_eq!(frame.point(frame.at((0.5, 3.5))), (0.5, 3.5));
+        }
+        let axis = Axis::linear("", 1.0, 4.0, 3, AxisRange::Tight).reversed();
+        assert_eq!([1.0, 4.0].map(|value| axis.fraction(value)), [Some(1.0), Some(0.0)]);
+    }
 }

@@ -15,6 +15,18 @@ pub const ROUND_OFF: f64 = 1e-6;
 /// not stated.
 pub const LEAST: f64 = 1e-3;
 
+/// Largest angle between gravity and an axis along which it acts [rad].
+const ALIGNED: f64 = 1e-6;
+/// Directions against gravity, and the symbols of the velocity along them.
+const AXIS_SYMBOLS: [(DVec3, &str); 6] = [
+    (DVec3::Z, "*v*_{z}"),
+    (DVec3::Y, "*v*_{y}"),
+    (DVec3::X, "*v*_{x}"),
+    (DVec3::NEG_Z, "−*v*_{z}"),
+    (DVec3::NEG_Y, "−*v*_{y}"),
+    (DVec3::NEG_X, "−*v*_{x}"),
+];
+
 /// Kind of a run by its number of grains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunKind {
@@ -144,8 +156,32 @@ impl RunFeatures {
     }
 
     /// Returns the name of the velocity along `up` in captions.
-    pub fn vertical_velocity(&self) -> &'static str {
-        if self.has_gravity { "Vertical velocity (down is negative)" } else { "Velocity along z" }
+    pub fn vertical_velocity(&self) -> String {
+        match self.has_gravity {
+            true if self.up == DVec3::Z => "Vertical velocity (down is negative)".to_owned(),
+            true => format!("Vertical velocity (down, {}, is negative)", self.down_text()),
+            false => "Velocity along z".to_owned(),
+        }
+    }
+
+    /// Returns the symbol of the velocity along `up` in label markup: a component of the velocity,
+    /// with a minus sign if gravity acts along a positive axis.
+    pub fn vertical_symbol(&self) -> &'static str {
+        match AXIS_SYMBOLS.iter().find(|(axis, _)| self.up.angle_between(*axis) < ALIGNED) {
+            Some((_, symbol)) => symbol,
+            None => "*v*_{up}",
+        }
+    }
+
+    /// Returns the direction of gravity in words: an axis or a unit vector.
+    fn down_text(&self) -> String {
+        let down = -self.up;
+        let axis = ["x", "y", "z"].into_iter().zip(DVec3::AXES).find_map(|(name, axis)| {
+            let along = |axis: DVec3| down.angle_between(axis) < ALIGNED;
+            let sign = if along(axis) { Some('+') } else { along(-axis).then_some('−') };
+            sign.map(|sign| format!("along {sign}{name}"))
+        });
+        axis.unwrap_or_else(|| format!("in the direction {}", vector_text(down)))
     }
 
     /// Returns the name of the speed normal to `up` in captions.
@@ -162,10 +198,7 @@ impl RunFeatures {
     pub fn direction_text(&self, velocity: DVec3) -> String {
         let direction = velocity.normalize_or_zero();
         if !self.has_gravity {
-            // The sum with zero turns -0 into 0.
-            let parts = direction.to_array().map(|x| (100.0 * x).round() / 100.0 + 0.0);
-            let parts = parts.map(|x| minus(&format!("{x:.2}")));
-            return format!("in the direction ({})", parts.join(", "));
+            return format!("in the direction {}", vector_text(direction));
         }
         let text = match direction.dot(self.up) {
             part if part > 0.95 => "upwards",
@@ -223,6 +256,13 @@ impl RunFeatures {
         };
         format!("{}{landed}", self.time_text(moment.time))
     }
+}
+
+/// Returns a unit vector with two decimals.
+fn vector_text(direction: DVec3) -> String {
+    // The sum with zero turns -0 into 0.
+    let parts = direction.to_array().map(|x| (100.0 * x).round() / 100.0 + 0.0);
+    format!("({})", parts.map(|x| minus(&format!("{x:.2}"))).join(", "))
 }
 
 /// Returns whether all of these grains are known to be lighter than the fluid.
@@ -363,6 +403,27 @@ mod tests {
             ([0.5, 0.0, 0.5], "obliquely upwards"),
         ] {
             assert_eq!(text(&run, velocity), words);
+        }
+    }
+
+    #[test]
+    fn the_vertical_velocity_is_named_by_its_axis() {
+        let mut run = RunFolder::default();
+        let mut names = |gravity: [f64; 3]| {
+            run.facts.gravity = Some(DVec3::from_array(gravity));
+            let features = RunFeatures::of(&run);
+            (features.vertical_symbol(), features.vertical_velocity())
+        };
+        for (gravity, symbol, words) in [
+            ([0.0, 0.0, -9.81], "*v*_{z}", "down is negative"),
+            ([0.0, -9.81, 0.0], "*v*_{y}", "down, along −y, is negative"),
+            ([9.81, 0.0, 0.0], "−*v*_{x}", "down, along +x, is negative"),
+            ([0.6, 0.0, -0.8], "*v*_{up}", "in the direction (0.60, 0.00, −0.80), is negative"),
+            ([0.0; 3], "*v*_{z}", "Velocity along z"),
+        ] {
+            let (found, said) = names(gravity);
+            assert_eq!(found, symbol);
+            assert!(said.contains(words), "{said}");
         }
     }
 

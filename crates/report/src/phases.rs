@@ -113,6 +113,10 @@ pub fn first(events: &[Event], kind: EventKind) -> Option<f64> {
     Some(events.iter().find(|event| event.kind == kind)?.time)
 }
 
+/// Part of the run at its start or end that contains the closest approach of a pair that only
+/// parts or only approaches.
+const ONE_WAY: f64 = 0.05;
+
 /// Key instant of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instant {
@@ -129,7 +133,8 @@ fn instant(time: f64, name: &'static str) -> Instant {
 /// Returns the key instants of a pair: before the first contact; first contact; the following role
 /// change, or else the middle of the tumbling or of the contact; after the separation, or the end.
 ///
-/// Without contact: before, at the role change and at the `closest` approach [s], and afterwards.
+/// Without contact: before, at the role change and at the `closest` approach [s], and afterwards;
+/// four even times if the pair only approaches or only parts.
 pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64) -> Vec<Instant> {
     let of = |kind| phases.iter().find(|phase| phase.kind == kind);
     let landing = of(PhaseKind::Landed).map_or(end, |phase| phase.start);
@@ -139,6 +144,9 @@ pub fn pair_instants(phases: &[Phase], events: &[Event], closest: f64, end: f64)
         Some(instant(change.time, "role change"))
     };
     let Some(kiss) = of(PhaseKind::Kissing).map(|phase| phase.start) else {
+        if closest < ONE_WAY * end || closest > (1.0 - ONE_WAY) * end {
+            return even_instants(end);
+        }
         let mut out = vec![instant(closest, "closest")];
         out.extend(role_change_after(0.0));
         out.sort_by(|a, b| a.time.total_cmp(&b.time));

@@ -103,11 +103,11 @@ pub enum ShapeError {
         defect: String,
     },
     /// All normals point inwards.
-    #[error("{}the mesh is inside out (its volume is {volume:.6e})", prefix(file))]
+    #[error("{}the mesh is inside out (its volume is {volume:.6e} m3)", prefix(file))]
     InsideOut {
-        /// Name of the file; empty for a mesh in memory.
+        /// File; empty for a mesh in memory.
         file: String,
-        /// Signed volume, in units of the mesh cubed.
+        /// Signed volume [m3].
         volume: f64,
     },
     /// The finished shape failed the quality check.

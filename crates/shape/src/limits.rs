@@ -3,7 +3,7 @@
 use crate::error::{Result, ShapeError};
 use sha2::{Digest, Sha256};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Limits on the size of input. Files that exceed them are refused before memory is allocated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,19 +97,21 @@ fn mem_available(meminfo: &str) -> Option<u64> {
     kib.checked_mul(1024)
 }
 
-/// Name of a file (without its folder) and the SHA-256 of its content, for provenance.
+/// Name of a file and the SHA-256 of its content, for provenance, and its path, for messages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SourceFile {
     /// File name without the folder.
     pub name: String,
+    /// Path as it was given; empty for data in memory.
+    pub path: PathBuf,
     /// SHA-256 in hexadecimal, as `sha256sum` prints it.
     pub sha256: String,
 }
 
 impl SourceFile {
     pub(crate) fn new(path: &Path, content: Sha256) -> SourceFile {
-        let name = path.file_name().unwrap_or_default();
-        SourceFile { name: name.to_string_lossy().into_owned(), sha256: hex(&content.finalize()) }
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        SourceFile { name, path: path.to_owned(), sha256: hex(&content.finalize()) }
     }
 }
 

@@ -3,6 +3,7 @@
 mod grain;
 
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
@@ -19,6 +20,11 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = provenance::commit().unwrap_or("unknown");
     format!("{} (commit {commit})", env!("CARGO_PKG_VERSION"))
 });
+
+/// Reads a whole number, 0 or more.
+fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| "expected a whole number, 0 or more".to_owned())
+}
 
 /// Command line of Grainwake; its description is that of the package.
 #[derive(Debug, Parser)]
@@ -69,7 +75,7 @@ pub struct RunArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Number of threads, 0 for all cores, at most 4 per core [default: value of the case]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
     pub threads: Option<usize>,
     /// Continue from the last checkpoint
     #[arg(long, conflicts_with = "force")]
@@ -103,7 +109,7 @@ pub struct CheckArgs {
     /// Case file
     pub case: PathBuf,
     /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
     pub threads: Option<usize>,
     #[command(flatten)]
     pub overrides: Overrides,
@@ -121,10 +127,22 @@ pub struct StudyArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Number of concurrent runs
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub jobs: usize,
     /// Number of threads of each run, 0 to share all cores among the jobs
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub threads: usize,
     /// Select runs: names with * and ?, separated by commas, or the i-th of N equal shares
     #[arg(long, value_name = "PATTERN|i/N")]
@@ -190,10 +208,22 @@ pub struct ValidateArgs {
     #[arg(long)]
     pub list: bool,
     /// Number of concurrent runs
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub jobs: usize,
     /// Number of threads of each run, 0 to share all cores among the jobs
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub threads: usize,
     /// Print the table, warnings and errors only
     #[arg(long)]
@@ -213,19 +243,50 @@ pub struct BenchArgs {
     #[command(flatten)]
     pub overrides: Overrides,
     /// Number of cells along x, y and z
-    #[arg(long, num_args = 3, value_names = ["NX", "NY", "NZ"], default_values_t = [100, 100, 390])]
+    #[arg(
+        long,
+        num_args = 3,
+        value_names = ["NX", "NY", "NZ"],
+        default_values_t = [100, 100, 390],
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub size: Vec<usize>,
     /// Number of grains, 8 cells across, evenly distributed
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub grains: usize,
     /// Number of timed steps
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        allow_negative_numbers = true,
+        value_parser = whole::<u64>
+    )]
     pub steps: u64,
     /// Number of untimed steps before
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        allow_negative_numbers = true,
+        value_parser = whole::<u64>
+    )]
     pub warm_up: u64,
     /// Number of threads, 0 for all cores
-    #[arg(long, value_name = "N", default_value_t = 2)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        allow_negative_numbers = true,
+        value_parser = whole::<usize>
+    )]
     pub threads: usize,
     /// Coupling scheme
     #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
@@ -261,7 +322,13 @@ pub struct ViewArgs {
     #[arg(required = true, value_name = "DIR")]
     pub folders: Vec<PathBuf>,
     /// Port on 127.0.0.1; 0 takes any free port
-    #[arg(long, value_name = "N", default_value_t = 8317, conflicts_with = "save")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 8317,
+        conflicts_with = "save",
+        allow_negative_numbers = true
+    )]
     pub port: u16,
     /// Open the page in the default browser
     #[arg(long, conflicts_with = "save")]

@@ -173,6 +173,26 @@ fn thousands_of_threads_are_reduced_with_a_warning() {
 }
 
 #[test]
+fn negative_values_of_options_are_told_their_range() {
+    let (folder, case) = folder_with(WET);
+    let refused = |arguments: &[&str], words: &str| {
+        let mut program = grainwake();
+        let done = program.args(arguments).arg(&case).assert().code(2);
+        done.stderr(contains(words).and(contains("unexpected argument").not()));
+    };
+    let whole = "'-1' for '--threads <N>': expected a whole number, 0 or more";
+    refused(&["run", "--threads", "-1"], whole);
+    refused(&["check", "--threads", "-1"], whole);
+    refused(&["check", "--set", "run.threads=10000"], "10000 threads: accepted are 0 to 4096");
+    let image = folder.path().join("stack.npy");
+    std::fs::write(&image, b"").unwrap();
+    let image = image.to_str().unwrap();
+    let scan = ["grain", "from-scan", image, "--smoothing", "-1", "-o", "out"];
+    let done = grainwake().args(scan).current_dir(folder.path()).assert().code(2);
+    done.stderr(contains("smoothing").and(contains("unexpected argument").not()));
+}
+
+#[test]
 fn thousands_of_threads_of_a_study_are_reduced_with_a_warning() {
     let (folder, _) = folder_with(WET);
     let study = folder.path().join("study.toml");

@@ -58,5 +58,5 @@ pub(super) fn source(volume: &Volume) -> SourceFile {
         Voxels::Grey(values) => values.iter().for_each(|v| hash.update(v.to_le_bytes())),
     }
     let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    SourceFile { name: "array".into(), sha256 }
+    SourceFile { name: "array".into(), sha256, ..SourceFile::default() }
 }

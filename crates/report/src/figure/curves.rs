@@ -77,9 +77,12 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
     let [trailing, leading] =
         vertical.each_ref().map(|curve| short(curve.peak().map_or(0.0, |peak| peak.1)));
     let sideways = horizontal.iter().flat_map(Series::values).fold(0.0, f64::max);
+    let symbol = scene.features.vertical_symbol();
     let (v, h, unit) = match scene.features.scales {
-        Some(_) => ("*v*_{z} / √(*d* *g*)  [–]", "|*v*_{h}| / √(*d* *g*)  [–]", " √(d g)"),
-        None => ("*v*_{z}  [m/s]", "|*v*_{h}|  [m/s]", " m/s"),
+        Some(_) => {
+            (format!("{symbol} / √(*d* *g*)  [–]"), "|*v*_{h}| / √(*d* *g*)  [–]", " √(d g)")
+        }
+        None => (format!("{symbol}  [m/s]"), "|*v*_{h}|  [m/s]", " m/s"),
     };
     let caption = format!(
         "(a) {} of both grains: the grain that trails at the start reaches {trailing}{unit}, the \
@@ -89,7 +92,7 @@ pub fn pair_velocity(scene: &Scene) -> Option<Figure> {
         short(sideways)
     );
     let panels = [
-        Panel::linear(v, vertical.to_vec(), &[0.0], 110.0),
+        Panel::linear(&v, vertical.to_vec(), &[0.0], 110.0),
         Panel::linear(h, horizontal.to_vec(), &[0.0], 65.0),
     ];
     Some(scene.with_events("velocity", "Velocity of the grains", caption, &panels))
@@ -119,11 +122,12 @@ pub fn single_velocity(scene: &Scene) -> Option<Figure> {
             short(peak.1),
             short(peak.0)
         ));
-        panels.push(Panel::linear("*v*_{z}  [m/s]", vec![vertical], &[0.0], 100.0));
+        let symbol = scene.features.vertical_symbol();
+        panels.push(Panel::linear(&format!("{symbol}  [m/s]"), vec![vertical], &[0.0], 100.0));
         if let Some(scales) = scene.features.scales {
             let scaled = curve(&|h, row| h.velocity[row].dot(up) / scales.velocity());
-            let label = "*v*_{z} / √(*d* *g*)  [–]";
-            panels.push(Panel::linear(label, vec![scaled], &[0.0], 65.0));
+            let label = format!("{symbol} / √(*d* *g*)  [–]");
+            panels.push(Panel::linear(&label, vec![scaled], &[0.0], 65.0));
             sentences.push("Vertical velocity divided by √(d g).".to_owned());
         }
     }

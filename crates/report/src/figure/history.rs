@@ -13,7 +13,6 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     // Grains that leave the box have shorter histories.
     let longest = moving.iter().map(|g| &scene.run.grains[*g]).max_by_key(|h| h.len())?;
     let (_, factor) = scene.features.time_axis();
-    let up = scene.features.up;
     let mean = |value: &dyn Fn(&History, usize) -> f64| -> Points {
         let at = |row: usize| {
             let histories = moving.iter().map(|g| &scene.run.grains[*g]);
@@ -27,7 +26,7 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     let speed: Points = squares.into_iter().map(|(t, v)| (t, v.sqrt())).collect();
     let contacts = mean(&|h, row| h.contacts[row].map_or(f64::NAN, f64::from));
     let (unit, factor) = scene.height_unit();
-    let height = mean(&|h, row| factor * h.position[row].dot(up));
+    let height = mean(&|h, row| factor * scene.height(h.position[row]));
     let (last_speed, last_contacts) = (speed.last()?.1, contacts.last()?.1);
     let curve = |points, colour| vec![Series::new(points, colour)];
     let height = curve(height, style::BLUE);
@@ -44,7 +43,10 @@ pub fn many(scene: &Scene) -> Option<Figure> {
     );
     if last_contacts.is_finite() {
         let contacts = curve(contacts, style::GREEN);
-        panels.push(Panel::linear("contacts per grain  [–]", contacts, &[0.0], 70.0));
+        // A count begins at 0, also if there are none.
+        let highest = contacts.iter().flat_map(Series::values).fold(0.0, f64::max);
+        let also = [0.0, if highest > 0.0 { 0.0 } else { 1.0 }];
+        panels.push(Panel::linear("contacts per grain  [–]", contacts, &also, 70.0));
         let last = short(last_contacts);
         caption += &format!(" (c) Mean number of contacts of a grain, {last} at the end.");
     }
@@ -70,16 +72,17 @@ pub fn each(scene: &Scene) -> Option<Figure> {
         moving.iter().enumerate().map(one).collect()
     };
     let (unit, factor) = scene.height_unit();
-    let height = curves(&|h, row| factor * h.position[row].dot(up));
+    let height = curves(&|h, row| factor * scene.height(h.position[row]));
     let velocity = curves(&|h, row| h.velocity[row].dot(up));
     let peak = |(grain, curve): (&usize, &Series)| {
         Some(format!("{} of grain {grain}", short(curve.peak()?.1)))
     };
     let peaks: Vec<String> = moving.iter().zip(&velocity).filter_map(peak).collect();
     let around = scene.least_range(height.iter().flat_map(Series::values), factor);
+    let symbol = scene.features.vertical_symbol();
     let panels = [
         Panel::linear(&format!("height  [{unit}]"), height, &around, 110.0),
-        Panel::linear("*v*_{z}  [m/s]", velocity, &[0.0], 110.0),
+        Panel::linear(&format!("{symbol}  [m/s]"), velocity, &[0.0], 110.0),
     ];
     let caption = format!(
         "(a) Height of the centre of each grain. (b) {}; the values of largest magnitude [m/s] \

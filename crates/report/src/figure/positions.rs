@@ -45,9 +45,13 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let last = |g: usize| run.grains[g].len() - 1;
     let place = |g: usize| run.wrapped(run.grains[g].position[last(g)]);
     let up = scene.vertical();
+    let flipped = scene.flipped();
     let [across, depth] = scene.horizontal();
     let (low, high) = extent(grains.iter().map(|g| place(*g)[up]))?;
-    let highest = high;
+    // Heights count from the side of the box towards which gravity points.
+    let (box_low, box_high) =
+        (run.facts.lower[up], run.facts.lower[up] + run.facts.size.map_or(0.0, |size| size[up]));
+    let highest = if flipped { box_high - low } else { high - box_low };
     // Equal heights have one colour.
     let (low, high) =
         extent(scene.least_range([low, high].into_iter(), 1.0).into_iter().chain([low, high]))?;
@@ -97,10 +101,10 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     let (unit, factor) = length_unit(side.width().max(side.height()).max(top.height()));
     let views = [
         (side, (LEFT, TOP), [across, up, depth], -1.0),
-        (top, (corner.0, TOP + corner.1), [across, depth, up], 1.0),
+        (top, (corner.0, TOP + corner.1), [across, depth, up], if flipped { -1.0 } else { 1.0 }),
     ];
     for (i, (window, corner, [h, v, hidden], direction)) in views.into_iter().enumerate() {
-        let frame = EqualAspectFrame { window, corner, scale };
+        let frame = EqualAspectFrame { window, corner, scale, flipped: flipped && v == up };
         // Grains nearer to the viewer cover others.
         let nearness = |g: &usize| direction * place(*g)[hidden];
         let mut order = grains.clone();
@@ -124,20 +128,24 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         frame.frame(&mut drawing, (below, Some(&names[1])));
     }
     let palette = palette(|part| part);
-    let label = format!("height of the centre  [{unit}]");
+    let label = match flipped {
+        true => format!("*{}* of the centre  [{unit}]", AXES[up]),
+        false => format!("height of the centre  [{unit}]"),
+    };
     let axis = Axis::linear(&label, low * factor, high * factor, 5, AxisRange::Tight);
     let corner = (0.5 * total - 90.0, TOP + bottom + 30.0);
     colour_bar(&mut drawing, corner, 180.0, &palette, &axis, (false, false));
     let time = run.grains[grains[0]].time[last(grains[0])];
     let caption = format!(
         "The {} grains at *t* = {} s, from the side (along {}) and from above, as {}; colour shows \
-         the height of the centre. The highest centre lies {} above the lower side of the box.{}",
+         {} of the centre. The highest centre lies {} above the lower side of the box.{}",
         grains.len(),
         short(time),
         AXES[depth],
         scene.drawn_as(&grains),
-        length(highest - run.facts.lower[up]),
-        scene.left_out(&grains)
+        if flipped { AXES[up] } else { "the height" },
+        length(highest),
+        scene.downwards() + &scene.left_out(&grains)
     );
     Some(Figure::new("positions", "Positions of the grains", caption, drawing))
 }

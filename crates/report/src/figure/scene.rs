@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use grainwake_formats::events::Event;
+use grainwake_formats::vti::Image;
 use grainwake_plot::Figure;
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::equal_aspect::length_unit;
@@ -9,7 +10,7 @@ use grainwake_plot::stacked::{Panel, Series, VerticalMark, stacked_panels};
 use grainwake_plot::style::series_colour;
 
 use super::grain_surface::{self, Outline, Surfaces};
-use super::section::SliceView;
+use super::section::{Section, SliceView};
 use crate::features::{LEAST, RunFeatures};
 use crate::phases::Instant;
 use crate::run_folder::{History, RunFolder};
@@ -219,6 +220,41 @@ impl Scene<'_> {
             () if up.y >= up.x => 1,
             () => 0,
         }
+    }
+
+    /// Returns whether the vertical axis points down: views show it downwards, so that grains fall
+    /// down in all pictures.
+    pub fn flipped(&self) -> bool {
+        self.features.up[self.vertical()] < 0.0
+    }
+
+    /// Returns a sentence about a vertical axis that points down; empty if it points up.
+    pub fn downwards(&self) -> String {
+        match self.flipped() {
+            true => format!(" Gravity acts along +{}, shown downwards.", AXES[self.vertical()]),
+            false => String::new(),
+        }
+    }
+
+    /// Extracts a slice, seen with gravity downwards if it lies in the plane.
+    ///
+    /// # Errors
+    /// As [`Section::of`].
+    pub fn section(&self, image: &Image) -> Result<Section, String> {
+        let mut section = Section::of(image, self.vertical())?;
+        section.view.flipped = self.flipped() && section.view.up == self.vertical();
+        Ok(section)
+    }
+
+    /// Returns the height of a point above the lower side of the box, if gravity acts along a
+    /// positive axis; else its coordinate against gravity [m].
+    pub fn height(&self, point: DVec3) -> f64 {
+        let (up, axis) = (self.features.up, self.vertical());
+        let floor = match self.run.facts.size.filter(|_| self.flipped()) {
+            Some(size) => (self.run.facts.lower[axis] + size[axis]) * up[axis],
+            None => 0.0,
+        };
+        point.dot(up) - floor
     }
 
     /// Returns the two other axes.

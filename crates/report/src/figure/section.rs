@@ -24,6 +24,8 @@ pub struct SliceView {
     pub across: usize,
     /// Axis upwards.
     pub up: usize,
+    /// Whether that axis points downwards instead: gravity acts along it.
+    pub flipped: bool,
 }
 
 impl SliceView {
@@ -34,7 +36,7 @@ impl SliceView {
             (true, 2) => 1,
             (true, _) => 2,
         };
-        SliceView { normal, across: 3 - normal - up, up }
+        SliceView { normal, across: 3 - normal - up, up, flipped: false }
     }
 
     /// Projects a point to the plane.
@@ -44,7 +46,8 @@ impl SliceView {
 
     /// Returns whether a positive rotation about the normal appears clockwise.
     pub fn clockwise(&self) -> bool {
-        DVec3::AXES[self.across].cross(DVec3::AXES[self.up])[self.normal] < 0.0
+        let turn = DVec3::AXES[self.across].cross(DVec3::AXES[self.up])[self.normal];
+        (turn < 0.0) != self.flipped
     }
 }
 
@@ -200,7 +203,11 @@ impl Section {
     ) -> Raster {
         let mut pixels = Vec::with_capacity(width * height);
         for row in 0..height {
-            let z = window.high.1 - window.height() * (row as f64 + 0.5) / height as f64;
+            let depth = window.height() * (row as f64 + 0.5) / height as f64;
+            let z = match self.view.flipped {
+                true => window.low.1 + depth,
+                false => window.high.1 - depth,
+            };
             for column in 0..width {
                 let x = window.low.0 + window.width() * (column as f64 + 0.5) / width as f64;
                 let place = position(match shading {
@@ -283,9 +290,18 @@ mod tests {
 
     #[test]
     fn every_normal_has_its_view() {
-        assert_eq!(SliceView::along(1, 2), SliceView { normal: 1, across: 0, up: 2 });
-        assert_eq!(SliceView::along(0, 1), SliceView { normal: 0, across: 2, up: 1 });
-        assert_eq!(SliceView::along(2, 2), SliceView { normal: 2, across: 0, up: 1 });
+        assert_eq!(
+            SliceView::along(1, 2),
+            SliceView { normal: 1, across: 0, up: 2, flipped: false }
+        );
+        assert_eq!(
+            SliceView::along(0, 1),
+            SliceView { normal: 0, across: 2, up: 1, flipped: false }
+        );
+        assert_eq!(
+            SliceView::along(2, 2),
+            SliceView { normal: 2, across: 0, up: 1, flipped: false }
+        );
         assert!(SliceView::along(1, 2).clockwise() && !SliceView::along(0, 2).clockwise());
         let mut turned = image(1);
         turned.frame.cells = [1, 8, 6];
@@ -294,6 +310,22 @@ mod tests {
         assert_eq!(section.whole().high, (6.0, 8.0));
         let inside = section.sample(|cell| section.solid(cell), (3.0, 4.0));
         assert_eq!(inside, 1.0, "the solid follows the axes");
+    }
+
+    #[test]
+    fn a_flipped_view_shows_the_lowest_cells_on_top() {
+        let mut section = Section::of(&image(1), 2).unwrap();
+        let clockwise = section.view.clockwise();
+        let raster = |section: &Section| {
+            let heights: Vec<f64> = (0..48).map(|cell| (cell / 8) as f64 / 5.0).collect();
+            let palette = vec![[0; 3]; 256];
+            let window = section.whole();
+            section.raster(window, [8, 6], palette, &heights, |v| v, Shading::Flat).pixels
+        };
+        assert_eq!([raster(&section)[0], raster(&section)[47]], [255, 0]);
+        section.view.flipped = true;
+        assert_eq!([raster(&section)[0], raster(&section)[47]], [0, 255]);
+        assert_ne!(section.view.clockwise(), clockwise, "rotation appears mirrored");
     }
 
     #[test]

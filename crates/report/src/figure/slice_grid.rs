@@ -206,8 +206,8 @@ pub fn draw(
         drawing.text((middle, 8.5), Anchor::Middle, column.title.trim());
         drawing.label((middle, 18.0), Anchor::Middle, SMALL, INK, &column.time);
         for (r, section) in column.sections.iter().enumerate() {
-            let frame =
-                EqualAspectFrame { window: column.window, corner: (x, row_top(r)), scale: zoom };
+            let (window, corner) = (column.window, (x, row_top(r)));
+            let frame = EqualAspectFrame { window, corner, scale: zoom, flipped: view.flipped };
             match section {
                 Some(section) => {
                     let outlines = column.outlines.get(r).map_or(&[][..], Vec::as_slice);
@@ -219,7 +219,7 @@ pub fn draw(
                     drawing.label(centre, Anchor::Middle, SMALL, FAINT, "no slice");
                 }
             }
-            let across = (r + 1 == count).then_some(x_name.as_str());
+            let across = (r + 1 == column.sections.len()).then_some(x_name.as_str());
             let up = if c == 0 { z_name.as_str() } else { "" };
             frame.frame(&mut drawing, (across, Some(up)));
         }
@@ -294,6 +294,7 @@ fn draw_arrows(
             continue;
         }
         let length = 1.7 * ARROWS * size.min(1.0);
+        let w = if frame.flipped { -w } else { w };
         let (dx, dy) = (u / size, -w / size);
         let end = |part: f64| (x + part * length * dx, y + part * length * dy);
         let (tail, tip) = (end(-0.5), end(0.5));

@@ -27,10 +27,9 @@ pub fn figures(scene: &Scene, notes: &mut Vec<String>) -> Vec<Figure> {
 
 /// Reads the slices at the key instants; a pair that no single plane contains has two rows.
 fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
-    let vertical = scene.vertical();
     let mut read = |frame: &FrameFile| -> Option<Section> {
         let image = scene.run.slice(frame);
-        let section = image.and_then(|image| Section::of(&image, vertical));
+        let section = image.and_then(|image| scene.section(&image));
         section.map_err(|what| notes.push(scene.run.left_out(frame, &what))).ok()
     };
     let mut out: Vec<Column> = Vec::new();
@@ -40,7 +39,7 @@ fn columns(scene: &Scene, notes: &mut Vec<String>) -> Vec<Column> {
         let frames: Vec<&FrameFile> = frames.collect();
         let through = |grain: usize| frames.iter().find(|frame| frame.grain == Some(grain));
         let sections = match scene.features.pair {
-            Some(pair) if through(pair[0]).is_some() => {
+            Some(pair) if pair.iter().any(|grain| through(*grain).is_some()) => {
                 pair.map(|grain| through(grain).and_then(|frame| read(frame))).to_vec()
             }
             _ => vec![frames.first().and_then(|frame| read(frame))],
@@ -116,7 +115,11 @@ pub fn crop(scene: &Scene, columns: &mut [Column]) {
         let (x, z) = (span(column, |p| p.0), span(column, |p| p.1));
         let left = 0.5 * (x.0 + x.1) - 0.5 * width;
         let (x0, x1) = fit(left, width, low.0, high.0);
-        let (z0, z1) = fit(z.0 - 2.5 * diameter, height, low.1, high.1);
+        let below = match column.sections.iter().flatten().any(|section| section.view.flipped) {
+            true => z.1 + 2.5 * diameter - height,
+            false => z.0 - 2.5 * diameter,
+        };
+        let (z0, z1) = fit(below, height, low.1, high.1);
         column.window = Window { low: (x0, z0), high: (x1, z1) };
     }
 }
@@ -135,9 +138,10 @@ fn speed(scene: &Scene, columns: &[Column]) -> Option<Figure> {
     let (scale, drawing) = draw(scene, columns, Quantity::Speed)?;
     let caption = format!(
         "{} Colour is the speed of the fluid, at most {} m/s; arrows show the velocity in the \
-         plane, their length in proportion.",
+         plane, their length in proportion.{}",
         planes(scene, columns),
-        short(scale.largest)
+        short(scale.largest),
+        downwards(scene, columns)
     );
     Some(Figure::new("speed", "Speed of the fluid", caption, drawing))
 }
@@ -157,7 +161,15 @@ fn vorticity(scene: &Scene, columns: &[Column]) -> Option<Figure> {
     if scale.largest > end {
         caption += &format!(" Values beyond ±{} 1/s have the end colours.", short(end));
     }
+    caption += &downwards(scene, columns);
     Some(Figure::new("vorticity", "Vorticity of the fluid", caption, drawing))
+}
+
+/// Returns a sentence about a vertical axis that is shown downwards; empty if there is none.
+fn downwards(scene: &Scene, columns: &[Column]) -> String {
+    let mut sections = columns.iter().flat_map(|column| column.sections.iter().flatten());
+    let flipped = sections.any(|section| section.view.flipped);
+    if flipped { scene.downwards() } else { String::new() }
 }
 
 /// Returns the planes and their times in words.

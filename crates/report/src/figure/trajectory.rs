@@ -10,6 +10,7 @@ use grainwake_plot::{Figure, letter};
 use super::scene::{AXES, Scene};
 use crate::features::{LEAST, length};
 use crate::phases::Instant;
+use crate::run_folder::History;
 
 /// Left margin [pt].
 const LEFT: f64 = 36.0;
@@ -17,12 +18,15 @@ const LEFT: f64 = 36.0;
 const MIDDLE: f64 = 14.0;
 /// Right margin [pt].
 const RIGHT: f64 = 18.0;
+/// Largest number of grains that are drawn at all key instants.
+const OUTLINED: usize = 4;
 
 /// Draws the paths along both horizontal axes.
 pub fn figure(scene: &Scene) -> Option<Figure> {
     let grains = scene.moving();
     let (up, sides) = (scene.vertical(), scene.horizontal());
     let windows = sides.map(|side| window(scene, &grains, side, up));
+    let shown = shown_instants(scene, &grains);
     let [Some(first), Some(second)] = windows else {
         return None;
     };
@@ -38,6 +42,7 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         window,
         corner: (x, top),
         scale,
+        flipped: scene.flipped(),
     });
     let mut drawing = Drawing::new(COLUMN, top + frames[0].height() + 26.0);
     for (i, grain) in grains.iter().enumerate() {
@@ -52,23 +57,27 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     for (i, (frame, side)) in frames.iter().zip(sides).enumerate() {
         frame.clip(&mut drawing, &format!("clip-{i}"));
         for (n, grain) in grains.iter().enumerate() {
-            draw_path(scene, *grain, dash(n), frame, (side, up), &mut drawing);
+            draw_path(scene, (*grain, shown), dash(n), frame, (side, up), &mut drawing);
         }
         drawing.end_clip();
         let [across, height] = [side, up].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));
         let height = (i == 0).then_some(height.as_str());
         frame.frame(&mut drawing, (Some(&across), height));
     }
-    let marked = longest(scene, &grains)?;
-    label_instants(scene, marked, &frames[1], up, &mut drawing);
+    let marked = longest(scene, &grains, up)?;
+    // A single instant needs no letter.
+    if shown.len() > 1 {
+        label_instants(scene, marked, &frames[1], up, &mut drawing);
+    }
     let name = |(i, instant): (usize, &Instant)| {
         let name = match instant.name {
             "" => String::new(),
             name => format!("{name}, "),
         };
-        format!("{} {name}{}", letter(i), scene.features.time_text(instant.time))
+        let time = scene.features.time_text(instant.time);
+        if shown.len() > 1 { format!("{} {name}{time}", letter(i)) } else { time }
     };
-    let named: Vec<String> = scene.instants.iter().enumerate().map(name).collect();
+    let named: Vec<String> = shown.iter().enumerate().map(name).collect();
     let mut caption = format!(
         "Paths of the centres seen along {} and {}, at equal scale, with the grains as {}",
         AXES[sides[1]],
@@ -79,9 +88,10 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         true => ".".to_owned(),
         false => format!(" at the start (pale) and at {}.", named.join("; ")),
     };
-    if grains.len() > 1 && !named.is_empty() {
+    if grains.len() > 1 && named.len() > 1 {
         caption += &format!(" The letters are at the height of grain {marked}.");
     }
+    caption += &scene.downwards();
     caption += &scene.left_out(&grains);
     if let Some(drift) = largest_drift(scene, &grains, up) {
         caption += &match scene.run.facts.diameter() {
@@ -130,7 +140,7 @@ fn window(scene: &Scene, grains: &[usize], side: usize, up: usize) -> Option<Win
 /// Draws the path of a grain, and the grain at the start and at the key instants.
 fn draw_path(
     scene: &Scene,
-    grain: usize,
+    (grain, shown): (usize, &[Instant]),
     dash: Option<&str>,
     frame: &EqualAspectFrame,
     (side, up): (usize, usize),
@@ -138,7 +148,7 @@ fn draw_path(
 ) {
     let history = &scene.run.grains[grain];
     let colour = series_colour(scene.features.grain_rank(grain));
-    let rows = scene.instants.iter().filter_map(|instant| history.nearest(instant.time));
+    let rows = shown.iter().filter_map(|instant| history.nearest(instant.time));
     for (row, strength) in [(0, 0.35)].into_iter().chain(rows.map(|row| (row, 1.0))) {
         let outlines = frame.paths(&scene.outlines(grain, row, side, up));
         drawing.path(&outlines, &outline_style(colour, strength));
@@ -159,10 +169,28 @@ fn draw_path(
     }
 }
 
-/// Returns the grain with the longest history, which is in the box at all key instants.
-fn longest(scene: &Scene, grains: &[usize]) -> Option<usize> {
-    // The first one of equal length.
-    grains.iter().copied().rev().max_by_key(|grain| scene.run.grains[*grain].len())
+/// Returns the instants at which grains are drawn: all of a few grains, the last one of more, whose
+/// outlines would hide each other.
+fn shown_instants<'a>(scene: &'a Scene, grains: &[usize]) -> &'a [Instant] {
+    let first = if grains.len() > OUTLINED { scene.instants.len().saturating_sub(1) } else { 0 };
+    &scene.instants[first..]
+}
+
+/// Returns the grain whose heights place the letters: one with the longest history, which is in the
+/// box at all key instants. Of more than two, one that moves along the vertical axis if there is
+/// any; a grain on a prescribed path may keep its height.
+fn longest(scene: &Scene, grains: &[usize], up: usize) -> Option<usize> {
+    let least = 0.1 * scene.run.facts.diameter().unwrap_or(0.0);
+    let moves = |history: &History| {
+        let ends = extent(history.position.iter().map(|position| position[up]));
+        grains.len() > 2 && ends.is_some_and(|(low, high)| high - low > least)
+    };
+    let rank = |grain: &usize| {
+        let history = &scene.run.grains[*grain];
+        (history.len(), moves(history))
+    };
+    // The first one of equals.
+    grains.iter().copied().rev().max_by_key(rank)
 }
 
 /// Draws the letters of the instants to the right of the frame, at the heights of a grain, without

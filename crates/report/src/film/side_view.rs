@@ -51,7 +51,11 @@ impl<'a> SideFilm<'a> {
             run.facts.size.map_or((low, high), |size| {
                 let (floor, ceiling) = (run.facts.lower[axis], run.facts.lower[axis] + size[axis]);
                 // The box, without empty height above the highest grain.
-                (floor, if axis == up { high.min(ceiling) } else { ceiling })
+                match (axis == up, scene.flipped()) {
+                    (false, _) => (floor, ceiling),
+                    (true, false) => (floor, high.min(ceiling)),
+                    (true, true) => (low.max(floor), ceiling),
+                }
             })
         };
         let (x, z) = (span(across), span(up));
@@ -85,7 +89,8 @@ impl View for SideFilm<'_> {
         let total = (MARGIN.0 + width + 10.0).max(240.0);
         let left = MARGIN.0.max(0.5 * (total - width));
         let mut drawing = Drawing::new(total, MARGIN.1 + height + 58.0);
-        let frame = EqualAspectFrame { window, corner: (left, MARGIN.1), scale };
+        let flipped = self.scene.flipped();
+        let frame = EqualAspectFrame { window, corner: (left, MARGIN.1), scale, flipped };
         let label = format!("*t* = {} s", short(time));
         drawing.label((left + 0.5 * width, 9.5), Anchor::Middle, SMALL, INK, &label);
         let rows = run.grains.iter().enumerate().filter_map(|(grain, history)| {

@@ -50,8 +50,7 @@ impl<'a> SliceFilm<'a> {
             let files = planes(scene, time);
             let mut read = Vec::new();
             for frame in &files {
-                match scene.run.slice(frame).and_then(|image| Section::of(&image, scene.vertical()))
-                {
+                match scene.run.slice(frame).and_then(|image| scene.section(&image)) {
                     Ok(section) if section.velocity.is_some() => read.push(section),
                     Ok(_) => notes.push(scene.run.left_out(frame, "it has no velocity")),
                     Err(what) => notes.push(scene.run.left_out(frame, &what)),
@@ -107,7 +106,7 @@ impl View for SliceFilm<'_> {
         let mut columns = Vec::new();
         for (frame, window) in self.files[index].iter().zip(&self.windows[index]) {
             let image = self.scene.run.slice(frame)?;
-            let section = Section::of(&image, self.scene.vertical())?;
+            let section = self.scene.section(&image)?;
             let mut column = column(self.scene, time, &section);
             column.window = *window;
             column.time = self.caption(index);

@@ -124,6 +124,11 @@ fn instants_follow_events() {
         [("drafting", 1.2), ("role change", 2.0), ("closest", 4.0), ("apart", 6.0)]
     );
     assert_eq!(names(&[], 5.0, 9.0), [("drafting", 3.0), ("closest", 5.0), ("apart", 7.0)]);
+    // A pair that only approaches, or only parts.
+    for closest in [0.0, 8.0] {
+        let even = [("", 2.0), ("", 4.0), ("", 6.0), ("", 8.0)];
+        assert_eq!(names(&[], closest, 8.0), even);
+    }
     // A pair that lands in contact, long before the end.
     let events = log(&[(1.0, EventKind::Kiss), (3.0, EventKind::Landing)]);
     assert_eq!(names(&events, 1.0, 9.0)[2..], [("in contact", 2.0), ("landing", 3.0)]);

@@ -565,6 +565,39 @@ fn a_grain_that_moves_sideways_shows_its_horizontal_speed() {
     remove(&folder);
 }
 
+#[test]
+fn gravity_along_a_positive_axis_is_shown_downwards() {
+    let folder = fresh::folder("single");
+    flows::single(&folder);
+    let ends = || {
+        // The path of the centre: the last line of many points of the figure.
+        let svg = svg(&render(&folder).unwrap(), "trajectories");
+        let path = svg.split(" d=\"").skip(1).max_by_key(|path| path.len()).unwrap();
+        let path = path.split('"').next().unwrap();
+        let place = |point: &str| point.split(' ').nth(1).unwrap().parse::<f64>().unwrap();
+        let mut points = path.split('L').map(place);
+        (points.next().unwrap(), points.next_back().unwrap())
+    };
+    let (start, end) = ends();
+    assert!(start < end, "the grain moves along -z, which is down");
+    replace(&folder, "case.resolved.toml", "[0, 0, -9.81]", "[0, 0, 9.81]");
+    let (start, end) = ends();
+    assert!(start > end, "now -z is up");
+    let rendered = render(&folder).unwrap();
+    let shown = "Gravity acts along +z, shown downwards.";
+    for (name, words) in [
+        ("trajectories", shown),
+        ("speed", shown),
+        ("vorticity", shown),
+        ("velocity", "Vertical velocity (down, along +z, is negative)"),
+        ("velocity", "−vz  [m/s]"),
+    ] {
+        let said = text_of(&svg(&rendered, name));
+        assert!(said.contains(words), "{name}: {said}");
+    }
+    remove(&folder);
+}
+
 /// Reverses the vertical velocity before `end` [s]; the rows after it are those of a rebound.
 fn rise(folder: &Path, end: f64) {
     edit_rows(folder, |cells| {
@@ -719,14 +752,47 @@ fn letters_follow_a_grain_through_a_periodic_box() {
         assert!(letters.len() == 4 && letters.is_sorted(), "{letters:?}");
     };
     in_order();
-    // Grain 0 rests at a height that changes by round-off only.
+    let words = |grain: usize| format!("The letters are at the height of grain {grain}.");
+    assert!(page(&render(&folder).unwrap()).contains(&words(0)));
+    // A grain that keeps its height has no letters.
+    let rest = |grains: &[&str]| {
+        edit_rows(&folder, |cells| {
+            let time: f64 = cells[0].parse().unwrap();
+            if grains.contains(&cells[1].as_str()) {
+                cells[4] = (0.05 + 1e-9 * time).to_string();
+            }
+        });
+    };
+    rest(&["0"]);
+    assert!(page(&render(&folder).unwrap()).contains(&words(1)));
+    // All grains move sideways, at heights that change by round-off only.
+    rest(&["1", "2"]);
     edit_rows(&folder, |cells| {
         let time: f64 = cells[0].parse().unwrap();
-        if cells[1] == "0" {
-            cells[4] = (0.05 + 1e-9 * time).to_string();
-        }
+        cells[2] = (0.02 + 0.01 * time).to_string();
     });
     in_order();
+    remove(&folder);
+}
+
+#[test]
+fn paths_of_several_grains_have_two_outlines_each() {
+    let folder = fresh::folder("several");
+    heap::heap(&folder, 6, false);
+    edit_rows(&folder, |cells| {
+        let (time, grain): (f64, f64) = (cells[0].parse().unwrap(), cells[1].parse().unwrap());
+        cells[4] = (0.09 - 0.05 * time - 0.005 * grain).to_string();
+        cells[21] = "0".into();
+    });
+    let rendered = render(&folder).unwrap();
+    let drawn = svg(&rendered, "trajectories");
+    // Six grains at two instants, in two views.
+    assert_eq!(drawn.matches("fill-opacity").count(), 6 * 2 * 2);
+    assert!(letters_and_frame(&drawn).0.is_empty());
+    assert!(!page(&rendered).contains("The letters are"));
+    // Without contacts the axis of their number begins at 0.
+    let history = text_of(&svg(&rendered, "history"));
+    assert!(history.contains("contacts per grain") && !history.contains("−1.0"), "{history}");
     remove(&folder);
 }
 

@@ -138,7 +138,12 @@ fn override_list<'i>(
             .parse()
             .map_err(|_| format!("`{name}` is a list: write {name}.0 for its first element"))?;
         let slot = items.get_mut(at).ok_or_else(|| {
-            format!("`{name}` has {count} elements, there is no number {at} (they count from 0)")
+            let accepted = match count {
+                0 => "the list is empty".to_owned(),
+                1 => "accepted is 0, its only element".to_owned(),
+                _ => format!("accepted are 0 to {}", count - 1),
+            };
+            format!("`{name}` has no element {at}: {accepted}")
         })?;
         let span = value.span();
         let value = match (slot.get_mut(), value.into_inner()) {

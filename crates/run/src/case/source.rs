@@ -94,9 +94,10 @@ impl Source {
             source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
         for (item, line) in padded.iter().zip(&overrides) {
             let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-            let parts = line.split('=').next().map_or(1, |key| key.split('.').count());
+            let key = line.split_once('=').map_or(line.as_str(), |(key, _)| key).trim();
+            let parts = key.split('.').count();
             override_table(table.get_mut(), extra.into_inner(), parts)
-                .map_err(|m| Problem::new(format!("--set {line}: {m}")))?;
+                .map_err(|m| Problem::new(m).key(key).at("--set", line, 0..key.len(), "here"))?;
         }
         collect_keys(table.get_ref(), "", text, &mut source.entries);
         let value = T::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;
@@ -225,7 +226,13 @@ impl Source {
                 let kind = (message.strip_prefix("invalid type: "))
                     .or_else(|| message.strip_prefix("invalid value: "));
                 let text = match kind {
-                    Some(kind) => format!("wrong kind of value: {}", wrong_kind(kind)),
+                    Some(kind) => {
+                        let text = format!("wrong kind of value: {}", wrong_kind(kind));
+                        match owner.starts_with("domain.cells") {
+                            true => text.replace("zero or more", "1 or more"),
+                            false => text,
+                        }
+                    }
                     None => plainly(message),
                 };
                 let help = match message {

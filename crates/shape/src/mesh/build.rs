@@ -38,9 +38,9 @@ pub fn shape_from_mesh(
             turned = copy;
             &turned
         }
-        Err(error) => return Err(error.in_file(&source.name)),
+        Err(error) => return Err(error.in_file(&source.path.to_string_lossy())),
     };
-    closed.check_crossings().map_err(|error| error.in_file(&source.name))?;
+    closed.check_crossings().map_err(|error| error.in_file(&source.path.to_string_lossy()))?;
     let built = from_closed(closed, Surface::Exact, provenance.clone(), &options.shape);
     built.map_err(|error| with_enough_cells(error, closed, &options.shape))
 }

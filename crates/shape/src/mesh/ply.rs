@@ -80,7 +80,7 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>, limits: &ReadLimits) -> Result<T
     let mut mesh = TriangleMesh { vertices, triangles: Vec::new() };
     for (face, element) in elements("face").iter().enumerate() {
         let number = |c: &i64| {
-            let reason = || format!("face {face} has corner number {c}");
+            let reason = || format!("face {face} (counted from 0) has corner number {c}");
             u32::try_from(*c).map_err(|_| ShapeError::malformed(path, reason()))
         };
         let corners = element.corners.iter().map(number).collect::<Result<Vec<u32>>>()?;

@@ -18,14 +18,15 @@ pub(super) fn push(
     corners: &[u32],
 ) -> Result<()> {
     if corners.len() < 3 {
-        let reason = format!("face {face} has {} corners", corners.len());
+        let reason = format!("face {face} (counted from 0) has {} corners", corners.len());
         return Err(ShapeError::malformed(path, reason));
     }
     let points = corners.iter().map(|c| mesh.vertices.get(*c as usize).copied());
     let flat = points.collect::<Option<Vec<DVec3>>>().and_then(|points| flatten(&points));
     let triangles = match flat {
         Some(points) => fan(&points).or_else(|| clip_ears(&points)).ok_or_else(|| {
-            let reason = format!("face {face} crosses itself; split it into triangles");
+            let reason =
+                format!("face {face} (counted from 0) crosses itself; split it into triangles");
             ShapeError::malformed(path, reason)
         })?,
         // Missing vertices and faces without area are reported by the checks of the mesh.
@@ -171,6 +172,6 @@ mod tests {
     fn a_crossed_polygon_is_refused_with_its_number() {
         let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]];
         let error = triangulate(&bow).unwrap_err().to_string();
-        assert!(error.contains("face 4 crosses itself; split"), "{error}");
+        assert!(error.contains("face 4 (counted from 0) crosses itself; split"), "{error}");
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
             ErrorKind::UnexpectedEof => {
                 format!("the file ends after {facets} facets, without endsolid")
             }
-            _ => format!("facet {}: {error}", facets + 1),
+            _ => format!("face {facets} (counted from 0): {}", plain(&error.to_string())),
         };
         ShapeError::malformed(path, reason)
     };
@@ -61,6 +61,17 @@ pub(super) fn read(path: &Path, mut bytes: Vec<u8>, limits: &ReadLimits) -> Resu
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh)
+}
+
+/// Rewords a message of `stl_io` about a coordinate that is not finite.
+fn plain(message: &str) -> String {
+    match message.strip_prefix("expected finite f32, got ") {
+        Some(found) => {
+            let value = found.split(' ').next().unwrap_or_default();
+            format!("a coordinate is {value}, not a finite number")
+        }
+        None => message.to_owned(),
+    }
 }
 
 /// Returns whether a file begins with the word "solid", as text files and many binary ones do.

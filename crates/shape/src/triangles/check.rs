@@ -41,7 +41,10 @@ impl TriangleMesh {
         for (face, triangle) in self.triangles.iter().enumerate() {
             let count = self.vertices.len();
             if let Some(v) = triangle.iter().find(|v| **v as usize >= count) {
-                let defect = format!("face {face} has vertex {v}, the mesh has {count} vertices");
+                let defect = format!(
+                    "face {face} has vertex {v}, the mesh has {count} vertices (both counted from \
+                     0)"
+                );
                 return Err(ShapeError::bad_mesh(defect));
             }
             let [a, b, c] = self.corners(face);
@@ -50,8 +53,8 @@ impl TriangleMesh {
             let twice_area = self.twice_area(face).length();
             if twice_area.is_nan() || twice_area <= FLAT * longest {
                 return Err(ShapeError::bad_mesh(format!(
-                    "face {face} near {} has no area; remove degenerate faces (in MeshLab: Remove \
-                     Zero Area Faces)",
+                    "face {face} (counted from 0) near {} has no area; remove degenerate faces \
+                     (in MeshLab: Remove Zero Area Faces)",
                     point(a)
                 )));
             }
@@ -104,8 +107,9 @@ impl TriangleMesh {
                 point(at)
             ))),
             (_, Some((face, neighbour, at))) => Err(ShapeError::bad_mesh(format!(
-                "faces {face} and {neighbour} near {} have opposite orientations; make the \
-                 orientation coherent (in MeshLab: Re-Orient All Faces Coherently)",
+                "faces {face} and {neighbour} (counted from 0) near {} have opposite \
+                 orientations; make the orientation coherent (in MeshLab: Re-Orient All Faces \
+                 Coherently)",
                 point(at)
             ))),
             _ => Ok(neighbours),
@@ -248,7 +252,7 @@ mod tests {
 
         let mut mesh = cube();
         mesh.triangles.push([0, 1, 1]);
-        assert_refused(&mesh, &["face 12 near (0, 0, 0) has no area"]);
+        assert_refused(&mesh, &["face 12 (counted from 0) near (0, 0, 0) has no area"]);
 
         let mut mesh = cube();
         mesh.vertices[3].y = f64::NAN;

@@ -30,9 +30,9 @@ impl TriangleMesh {
         match crossings.first() {
             None => Ok(()),
             Some(&(face, other, at)) => Err(ShapeError::bad_mesh(format!(
-                "faces {face} and {other} cross near {} ({} pairs cross in all), so inside and \
-                 outside are undefined there; repair the mesh (in MeshLab: Select Self Intersecting \
-                 Faces; in Blender: Remesh)",
+                "faces {face} and {other} (counted from 0) cross near {} ({} pairs cross in \
+                 all), so inside and outside are undefined there; repair the mesh (in MeshLab: \
+                 Select Self Intersecting Faces; in Blender: Remesh)",
                 point(at),
                 crossings.len()
             ))),

@@ -348,6 +348,9 @@ fn errors_of_damaged_files_are_in_terms_of_their_format() {
     let cut = facets.windows(6).rposition(|word| word == b"vertex").unwrap();
     let facet = String::from_utf8(facets.clone()).unwrap().replacen("endloop", "endlop", 1);
     let bytes = |text: String| text.into_bytes();
+    let text_facets = String::from_utf8(facets.clone()).unwrap();
+    let first = text_facets.lines().find(|line| line.contains("vertex")).unwrap();
+    let not_finite = bytes(text_facets.replacen(first, "vertex nan 0 0", 1));
     let vertices = mesh.vertices.len();
     for (name, file, expected) in [
         ("a.ply", facets.clone(), "the first line is not \"ply\"".to_owned()),
@@ -388,7 +391,8 @@ fn errors_of_damaged_files_are_in_terms_of_their_format() {
             facets[..cut].to_vec(),
             format!("the file ends after {} facets, without endsolid", counted - 1),
         ),
-        ("a.stl", bytes(facet), "facet 1: expected [\"endloop\"]".to_owned()),
+        ("a.stl", not_finite, "face 0 (counted from 0): a coordinate is NaN, not".to_owned()),
+        ("a.stl", bytes(facet), "face 0 (counted from 0): expected [\"endloop\"]".to_owned()),
         ("a.obj", Vec::new(), "the file has no faces".to_owned()),
         ("a.obj", bytes(text.clone()), "the file has no faces".to_owned()),
         ("a.stl", b"solid a\nendsolid a\n".to_vec(), "the file has no faces".to_owned()),

@@ -115,7 +115,7 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
         }
     };
     if claim.observed {
-        outcome.says += "; pairs that landed before the event are left out";
+        outcome.says += "; pairs that landed, or whose run ended, before the event are left out";
     }
     if outcome.uninformative > 0 && matches!(outcome.claimed, Claimed::AtMost(_)) {
         let left_out = outcome.uninformative;
@@ -128,7 +128,9 @@ pub(super) fn test(claim: &Claim, records: &[RunRecord]) -> Outcome {
                 format!("; {censored} without the event, ranked last with equal ranks")
             }
             Test::Spread { .. } => format!("; {censored} pairs without the event are left out"),
-            _ => format!("; {censored} without the event before the landing, which count as last"),
+            _ => format!(
+                "; {censored} without the event before the landing or the end, which count as last"
+            ),
         };
     }
     outcome

@@ -2,7 +2,8 @@
 //!
 //! Lengths are in equivalent diameters d, times in sqrt(d/g), speeds in sqrt(d g), down positive.
 //! *Leading* is the lower grain at the start, *trailing* the upper one; of grains that rise the
-//! upper one leads. All values end when a grain first lands or leaves the box.
+//! upper one leads. The observation ends when a grain first lands or leaves the
+//! box, or with the run.
 
 use glam::{DQuat, DVec3};
 use grainwake_formats::events::{Event, EventKind};
@@ -19,9 +20,10 @@ pub struct PairMeasures {
     pub kiss_time: Option<f64>,
     /// From the first contact until the line of centres is at 45 degrees or the contact ends.
     pub kissing_stage: Option<f64>,
-    /// From the first contact until the pair separates or lands.
+    /// From the first contact until the pair separates, or the observation ends.
     pub contact_stage: Option<f64>,
-    /// Whether the pair separated before landing; if not, `contact_stage` is a lower bound.
+    /// Whether the pair separated before the end of the observation; if not, `contact_stage` is a
+    /// lower bound.
     pub parted: Option<bool>,
     /// Line of centres at 45 degrees, after the first contact.
     pub tumble_time: Option<f64>,

@@ -146,8 +146,8 @@ impl RunRecord {
         of_pair.or_else(|| self.settling.as_ref()?.get(name))
     }
 
-    /// Returns whether a quantity is only a lower bound: the pair landed, or the run ended, while
-    /// still in contact.
+    /// Returns whether a quantity is only a lower bound: the pair was still in contact when a grain
+    /// landed or left the box, or the run ended.
     pub fn is_lower_bound(&self, quantity: &str) -> bool {
         let Some(pair) = self.pair.as_ref().filter(|pair| pair.parted == Some(false)) else {
             return false;

@@ -11,9 +11,10 @@ pub(super) fn tables(results: &KissingResults) -> Markup {
     let gridded = results.levels.iter().any(|level| level.grid.is_some());
     html! {
         p {
-            "Share of runs in which the pair comes into contact before it lands: mean over the \
-             models of the share of their members, with Clopper and Pearson's 95 % interval for \
-             the number of models. The median time is that by which half of the runs have kissed."
+            "Share of runs in which the pair comes into contact before it lands or the run \
+             ends: mean over the models of the share of their members, with Clopper and \
+             Pearson's 95 % interval for the number of models. The median time is that by which \
+             half of the runs have kissed."
         }
         (levels(&results.levels, gridded))
         @if !results.differences.is_empty() { (differences(&results.differences, gridded)) }
@@ -66,9 +67,9 @@ fn differences(differences: &[LevelDifference], gridded: bool) -> Markup {
         p {
             "Differences over the models that are equal on all other axes. The p value of the \
              share is that of exchanging the levels within the models. The log-rank test of \
-             the times is stratified by these axes and includes pairs that land first; its p value \
-             counts the members of a model as one. The difference of the times is the Hodges-Lehmann shift of the median times of models \
-             that kiss at both levels."
+             the times is stratified by these axes and includes pairs without contact; its p value \
+             counts the members of a model as one. The difference of the times is the \
+             Hodges-Lehmann shift of the median times of models that kiss at both levels."
         }
         (table(&columns, differences.iter().map(row)))
     }

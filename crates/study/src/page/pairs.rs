@@ -13,6 +13,8 @@ use crate::measure::record::RunRecord;
 
 /// Gap that counts as a near miss of a pair without contact [d]: one cell of the paper's mesh.
 const NEAR_MISS: f64 = 0.125;
+/// Growth of the distance of the centres above which grains have moved apart [d].
+const PARTED: f64 = 0.01;
 
 /// Returns the numbers of contacts and separations as half a sentence.
 pub(super) fn lead(records: &[RunRecord]) -> Markup {
@@ -20,15 +22,25 @@ pub(super) fn lead(records: &[RunRecord]) -> Markup {
         let pairs = records.iter().filter_map(|r| r.pair.as_ref());
         pairs.filter(|p| property(p)).count()
     };
-    let near_miss =
-        count(|p| p.kiss_time.is_none() && p.closest_gap.is_some_and(|gap| gap < NEAR_MISS));
+    let near_miss = count(|p| {
+        let close = p.closest_gap.is_some_and(|gap| gap < NEAR_MISS);
+        p.kiss_time.is_none() && close && moved_apart(p)
+    });
     html! {
-        "; runs in which the pair kissed before landing: " (count(|p| p.kiss_time.is_some()))
+        "; runs in which the pair kissed before the first landing or the end: "
+        (count(|p| p.kiss_time.is_some()))
         ", and separated: " (count(|p| p.parted == Some(true)))
         ", and kissed more than once: " (count(|p| p.repeated == Some(true)))
-        "; runs in which the grains passed within " (NEAR_MISS)
-        " d of each other without contact: " (near_miss)
+        "; runs in which the grains came within " (NEAR_MISS)
+        " d of each other without contact, and moved apart again: " (near_miss)
     }
+}
+
+/// Returns whether the centres were closer than at the end of the observation: the grains do not
+/// approach any more.
+fn moved_apart(pair: &PairMeasures) -> bool {
+    let ends = pair.closest.zip(pair.final_distance);
+    ends.is_some_and(|(closest, last)| last > closest + PARTED)
 }
 
 /// Returns the shortest and longest contact times, and their uncertainty.
@@ -55,7 +67,8 @@ fn extremes(what: &str, all: &[Observation], several: bool) -> Markup {
     html! {
         p {
             @if sorted.is_empty() {
-                "No model has a " (what) " before the grains landed, in more than half of its runs."
+                "No model has a " (what) ", in more than half of its runs, before a grain lands or \
+                 leaves the box, or the run ends."
             } @else {
                 b { "Shortest " (what) ", by model" } ": " (first.join(", ")) ". "
                 b { "Longest" } ": " (last.join(", ")) "."

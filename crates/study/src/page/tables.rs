@@ -86,8 +86,9 @@ pub(super) fn runs(content: &Content) -> Markup {
     html! {
         @if content.has_pairs() {
             p {
-                "Dimensionless values, until the first landing. ≥: lower bound, the pair landed in \
-                 contact. All quantities are in " code { "table.csv" } "."
+                "Dimensionless values, until a grain first lands or leaves the box, or the run \
+                 ends. ≥: lower bound, the pair was still in contact then. All quantities are in "
+                code { "table.csv" } "."
             }
         }
         @if content.has_settling() { (settling::table_note()) }

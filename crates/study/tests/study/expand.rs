@@ -191,6 +191,11 @@ fn problems_are_located() {
         one(&STUDY.replace("key = [\"grain.0.density\"", "keys = [\"grain.0.density\""));
     assert!(message.contains("unknown key `keys`") && help.contains("`key`"), "{message} {help}");
     assert_eq!(place, Some((true, 6)));
+    let beyond = STUDY.replace("key = [\"grain.0.density\"", "key = [\"grain.4.density\"");
+    let (message, _, place) = one(&beyond);
+    assert!(message.starts_with("grain.4.density: model \""), "{message}");
+    assert!(message.contains("`grain` has no element 4: accepted are 0 to 1"), "{message}");
+    assert!(place.is_some_and(|(in_study, _)| in_study), "{place:?}");
     let (message, _, place) = one(&STUDY.replace("case.toml", "cases.toml"));
     assert!(message.contains("no case file"), "{message}");
     assert_eq!(place, Some((true, 3)));

@@ -151,7 +151,8 @@ fn events_after_the_landing_are_right_censored() {
     assert!(
         found == "holds"
             && says.contains("for 16 of 16")
-            && says.contains("4 without the event before the landing, which count as last"),
+            && says
+                .contains("4 without the event before the landing or the end, which count as last"),
         "{says}"
     );
     let (found, says) = verdict(&late, &format!("observed = true\n{ORDER}"));

@@ -80,9 +80,37 @@ fn a_landing_is_no_kissing_time() {
     let missed =
         "3 models, in half or more of whose runs the pair landed or the run ended before, have no";
     assert!(page.contains(missed), "{page}");
-    assert!(drawn.contains("no kiss in half of the runs or more"), "the legend of hollow symbols");
-    assert!(page.contains("runs in which the pair kissed before landing: 8,"), "{page}");
+    assert!(drawn.contains("Hollow symbols above the axis: 3 models, in half or more"), "{drawn}");
+    let kissed = "runs in which the pair kissed before the first landing or the end: 8,";
+    assert!(page.contains(kissed), "{page}");
     assert!(!page.contains("right-censored"));
+}
+
+#[test]
+fn pairs_that_still_approach_have_not_passed() {
+    let (_root, folder) = study(|_, _| None);
+    let file = folder.join("table.json");
+    // All pairs come close without contact; the light ones move apart again.
+    let mut records: Vec<RunRecord> =
+        serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    for record in &mut records {
+        let last = if record.model.ends_with("light") { 2.0 } else { 1.1 };
+        let pair = record.pair.as_mut().unwrap();
+        (pair.closest, pair.closest_gap) = (Some(1.1), Some(0.1));
+        (pair.final_distance, pair.landing_time) = (Some(last), None);
+    }
+    write_tables(&records, &folder).unwrap();
+    let page = std::fs::read_to_string(render(&folder).unwrap().page).unwrap();
+    let near = "within 0.125 d of each other without contact, and moved apart again: 4";
+    assert!(page.contains(near), "{page}");
+    for (words, known) in [
+        ("No model has a first contact, in more than half of its runs, before a grain lands", true),
+        ("or the run ends. ≥: lower bound, the pair was still in contact then.", true),
+        ("landed in contact", false),
+        ("before the grains landed", false),
+    ] {
+        assert_eq!(page.contains(words), known, "{words}: {page}");
+    }
 }
 
 #[test]

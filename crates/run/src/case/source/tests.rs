@@ -75,7 +75,7 @@ fn a_wrong_override_is_located_on_its_own_line() {
     let p = problem(CASE, &["time.end=2 mm"]);
     assert_eq!(p.place().unwrap().0, "--set");
     assert!(problem(CASE, &["nonsense"]).message.contains("no `=`"));
-    assert!(problem(CASE, &["grain.3.density=1"]).message.contains("no number 3"));
+    assert!(problem(CASE, &["grain.3.density=1"]).message.contains("no element 3"));
 }
 
 #[test]
@@ -105,6 +105,14 @@ fn bare_numbers_are_known() {
 }
 
 #[test]
+fn an_index_beyond_a_list_is_located() {
+    let p = problem(CASE, &["grain.4.density=2"]);
+    assert_eq!(p.message, "`grain` has no element 4: accepted is 0, its only element");
+    assert_eq!(p.key.as_deref(), Some("grain.4.density"));
+    assert_eq!(p.place(), Some(("--set", 1, 1)));
+}
+
+#[test]
 fn a_missing_table_is_named() {
     let p = problem(&CASE.replace("[time]\nend = 1\n", ""), &[]);
     assert_eq!(p.message, "the table [time] is missing in case.toml");
@@ -128,6 +136,7 @@ fn a_table_instead_of_a_row_of_a_list_is_explained() {
 fn kinds_of_values_have_plain_names() {
     for (set, words) in [
         ("run.threads=-1", "found -1, expected a whole number, zero or more"),
+        ("domain.cells=[8, -8, 8]", "found -8, expected a whole number, 1 or more"),
         ("run.threads=1.5", "found 1.5, expected a whole number, zero or more"),
         ("fluid=3", "found 3, expected a table of keys and values"),
         ("packing=3", "found 3, expected a list"),

@@ -257,10 +257,15 @@ fn plane(
     Some(Plane { axis, position })
 }
 
+/// Most threads of a case.
+const MOST_THREADS: usize = 4096;
+
 /// Refuses absurd numbers of threads.
 pub(super) fn check_threads(check: &mut Checker, raw: &RawRun) {
     let threads = &raw.threads;
-    if threads.value > 4096 {
-        check.fail(&threads.span, format!("{} threads", threads.value), "0 takes all cores");
+    if threads.value > MOST_THREADS {
+        let message = format!("{} threads: accepted are 0 to {MOST_THREADS}", threads.value);
+        let help = "0 takes all cores; more than 4 per core are reduced to that with a warning";
+        check.fail(&threads.span, message, help);
     }
 }

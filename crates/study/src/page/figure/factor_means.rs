@@ -103,7 +103,7 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
         false => "",
     };
     let left_out = match shares > 0 {
-        true => "A pair that lands before the event counts in the kissing share only.",
+        true => "A pair without the event counts in the kissing share only.",
         false => "A run that ends before the event of a quantity is left out.",
     };
     let caption = format!(

@@ -71,8 +71,8 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     let runs: usize = shown.iter().map(|l| l.runs).sum();
     let caption = format!(
         "Share of the pairs that have come into contact by time *t* (cumulative incidence), the \
-         mean over the models of {runs} runs. Pairs that land first never count. A curve below 1 \
-         ends at the last contact or landing."
+         mean over the models of {runs} runs. Pairs without contact never count. A curve below 1 \
+         ends at the last contact, landing or end of a run."
     );
     Some(Figure::new("kissing-share", "Share of the pairs that have kissed", caption, drawing))
 }

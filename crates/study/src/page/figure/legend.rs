@@ -233,6 +233,12 @@ mod tests {
 
     #[test]
     fn levels_differ() {
+        for count in 1..4 {
+            // Vermilion and orange look alike.
+            let colours: Vec<_> =
+                (0..count).map(|n| LineStyle::of_level(n, count).colour).collect();
+            assert!(distinct(&colours) && !colours.contains(&grainwake_plot::style::ORANGE));
+        }
         for count in [4, 5, 24] {
             let of_level = |n| LineStyle::of_level(n, count);
             let styles: Vec<_> = (0..count).map(of_level).map(|s| (s.colour, s.dash)).collect();

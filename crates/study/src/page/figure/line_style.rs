@@ -5,7 +5,9 @@ use grainwake_plot::style::{BLUE, GREEN, INK, ORANGE, SERIES_COLOURS, VERMILION,
 
 pub(super) const DASHES: [Option<&str>; 4] =
     [None, Some("4 1.8"), Some("1.2 1.5"), Some("6 1.6 1.2 1.6")];
-/// Colours of up to four levels.
+/// Colours of up to three levels: vermilion and orange look alike.
+const THREE: [&str; 3] = [VERMILION, BLUE, GREEN];
+/// Colours of four levels.
 const FOUR: [&str; 4] = [VERMILION, ORANGE, BLUE, GREEN];
 /// Number of lines that differ in colour or dash pattern.
 pub(super) const MOST: usize = SERIES_COLOURS * DASHES.len();
@@ -42,7 +44,8 @@ impl LineStyle {
 
     /// Returns the style of the n-th of `count` levels of an axis.
     pub fn of_level(n: usize, count: usize) -> LineStyle {
-        match FOUR.get(n).filter(|_| count <= FOUR.len()) {
+        let colours = if count <= THREE.len() { &THREE[..] } else { &FOUR };
+        match colours.get(n).filter(|_| count <= FOUR.len()) {
             Some(colour) => LineStyle { colour, dash: None, sign: Marker::nth(n) },
             None => LineStyle::nth(n),
         }

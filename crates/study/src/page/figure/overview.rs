@@ -91,7 +91,7 @@ fn distances(data: &FigureData) -> Option<Figure> {
         title: "Distance of the centres against time",
         up: "*D*_{r}/*d*  [–]",
         caption: format!(
-            "Distance of the centres of the pairs of {} runs, until the first landing.",
+            "Distance of the centres of the pairs of {} runs, until the first landing or the end.",
             curves.len()
         ),
     };

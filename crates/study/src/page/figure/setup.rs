@@ -39,11 +39,12 @@ fn draw(name: &str, case: &Case) -> Option<Figure> {
     let loops = [trailing, leading].map(outlines);
     let whole = Window { low: (low.x, low.z), high: (high.x, high.z) };
     let scale = (0.40 * COLUMN / whole.width()).min(300.0 / whole.height());
-    let overall = EqualAspectFrame { window: whole, corner: (34.0, TOP), scale };
+    let overall = EqualAspectFrame { window: whole, corner: (34.0, TOP), scale, flipped: false };
     let pair = pair_window(&loops);
     let right = overall.corner.0 + overall.width() + 30.0;
     let zoom = ((COLUMN - right - 46.0) / pair.width()).min(overall.height() / pair.height());
-    let detail = EqualAspectFrame { window: pair, corner: (right, TOP), scale: zoom };
+    let detail =
+        EqualAspectFrame { window: pair, corner: (right, TOP), scale: zoom, flipped: false };
     let frame_style = format!("fill=\"none\" stroke=\"{FAINT}\" stroke-width=\"{HAIR}\"");
     let mut drawing = Drawing::new(COLUMN, TOP + overall.height() + 26.0);
     let (x, y) = overall.at((pair.low.0, pair.high.1));
