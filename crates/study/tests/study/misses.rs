@@ -70,8 +70,10 @@ fn a_landing_is_no_kissing_time() {
     let drawn = svg(&folder, "fig01-kissing-time.svg");
     assert!(drawn.contains("no kiss"), "the strip above the axis");
     assert!(!drawn.contains(">40<") && !drawn.contains(">26<"), "no landing time on the axis");
-    // Two panels, three models without a time each, two of them with a kiss.
-    assert_eq!(drawn.matches("stroke-width=\"0.9\"").count(), 2 * (3 + 2), "symbols and kisses");
+    // Two panels, three models without a time each, two of them with a kiss; and the legend.
+    let symbols = drawn.matches("stroke-width=\"0.9\"").count();
+    assert_eq!(symbols, 2 * (3 + 2) + 1, "symbols and kisses");
+    assert!(drawn.contains("no kiss in half of the runs or more"), "the legend");
     // A line joins the light models across the grip. None joins a kiss and a landing, or the rough
     // light and heavy models across that of medium weight.
     let joined = drawn.lines().filter(|l| l.contains("#b4b4b8") && l.contains('L'));

@@ -133,11 +133,16 @@ impl LineStyles {
     /// Returns the legend of the `drawn` runs, with symbols or else lines, for a frame with the
     /// given left edge [pt].
     pub fn legend(&self, drawn: &[&Run], left: f64, symbols: bool) -> Legend {
+        Legend::new(self.legend_entries(drawn, symbols), PAGE - left)
+    }
+
+    /// Returns the entries of [`LineStyles::legend`].
+    pub fn legend_entries(&self, drawn: &[&Run], symbols: bool) -> Vec<Entry> {
         let entry = |(name, style): (String, LineStyle)| match symbols {
             true => symbol_entry(&name, style),
             false => Entry::line(text::literal(&name), style.colour, style.dash),
         };
-        Legend::new(self.entries(drawn).into_iter().map(entry), PAGE - left)
+        self.entries(drawn).into_iter().map(entry).collect()
     }
 }
 

@@ -159,7 +159,10 @@ pub(super) fn against_parameters(
     // Names along the axis replace the legend of a single panel.
     let named = matches!(parameters.as_slice(), [Parameter { names: Some(_), .. }]);
     let drawn: Vec<&Run> = all.iter().filter_map(|o| data.run(&o.model)).collect();
-    let legend = if named { Legend::default() } else { styles.legend(&drawn, LEFT, true) };
+    let mut entries = if named { Vec::new() } else { styles.legend_entries(&drawn, true) };
+    let several = data.plan.has_members();
+    entries.extend((misses > 0).then(|| misses::entry(several)));
+    let legend = Legend::new(entries, PAGE - LEFT);
     let columns = parameters.len().min(2);
     let width = (PAGE - LEFT - 8.0 - GAP * (columns as f64 - 1.0)) / columns as f64;
     let frame = |(i, parameter): (usize, &Parameter)| {
@@ -196,7 +199,6 @@ pub(super) fn against_parameters(
     if all.len() < models {
         caption += &format!(" {} of {models} models have a value.", all.len());
     }
-    let several = data.plan.has_members();
     if several {
         caption += match is_time(quantity) {
             true => {
