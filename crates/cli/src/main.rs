@@ -22,13 +22,13 @@ mod threads;
 mod validate;
 mod view;
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 
 use args::{Cli, Command};
 use out::{print, tell};
 
 fn main() -> std::process::ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::read();
     signals::survive_file_size_limit();
     threads::limit_default_pool();
     let done = match &cli.command {

@@ -42,10 +42,10 @@ pub struct NewGrain {
 #[derive(Debug, Args)]
 pub struct GrainOptions {
     /// Number of surface nodes [default: one per (diameter / 20)^2 of surface]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>)]
     pub nodes: Option<usize>,
     /// Number of cells of the distance field across the longest extent
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>)]
     pub cells: Option<usize>,
     /// Replace existing files
     #[arg(long)]
@@ -86,20 +86,14 @@ pub struct FromScanArgs {
     pub labels: bool,
     /// Threshold between void and solid in a grey image: a grey value, "otsu", or "otsu3" (the
     /// upper of two thresholds)
-    #[arg(long, value_name = "VALUE|otsu|otsu3", allow_negative_numbers = true)]
+    #[arg(long, value_name = "VALUE|otsu|otsu3")]
     pub threshold: Option<String>,
     /// Apply a median filter of 27 voxels before the threshold
     #[arg(long)]
     pub median: bool,
     /// Separate touching grains where the neck is narrower than this fraction of the smaller grain,
     /// 0.87 if no value is given
-    #[arg(
-        long,
-        value_name = "NECK",
-        num_args = 0..=1,
-        default_missing_value = "0.87",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "NECK", num_args = 0..=1, default_missing_value = "0.87")]
     pub separate: Option<f64>,
     /// Locate surfaces by the mask even if there are grey values
     #[arg(long)]
@@ -118,7 +112,7 @@ pub struct FromScanArgs {
     pub largest_piece: bool,
     /// Standard deviation of the smoothing, in voxels [default: 1.1 with grey values, 1.5 with a
     /// mask]
-    #[arg(long, value_name = "VOXELS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "VOXELS")]
     pub smoothing: Option<f64>,
     /// Try rejected labels again with more smoothing or a median, each with the
     /// least that works
@@ -135,34 +129,16 @@ pub struct FromScanArgs {
 #[derive(Debug, Args)]
 pub struct FamilyArgs {
     /// Krumbein sphericities S, 0.3 to 0.97, one per row of the family
-    #[arg(
-        long,
-        value_delimiter = ',',
-        required = true,
-        value_name = "S,...",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_delimiter = ',', required = true, value_name = "S,...")]
     pub sphericity: Vec<f64>,
     /// Wadell roundnesses R, 0.05 to 0.95, one per column of the family
-    #[arg(
-        long,
-        value_delimiter = ',',
-        required = true,
-        value_name = "R,...",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_delimiter = ',', required = true, value_name = "R,...")]
     pub roundness: Vec<f64>,
     /// Flatness c/b, 0.2 to 1 and at least S^3 [default: 0.8, or S^3 if that is larger]
-    #[arg(long, value_name = "RATIO", allow_negative_numbers = true)]
+    #[arg(long, value_name = "RATIO")]
     pub flatness: Option<f64>,
     /// Seed of the generator; equal seeds give equal grains
-    #[arg(
-        long,
-        default_value_t = 1,
-        value_name = "N",
-        allow_negative_numbers = true,
-        value_parser = whole::<u64>
-    )]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64>)]
     pub seed: u64,
     /// Diameter of the sphere of equal volume of all grains
     #[arg(long, default_value = "2 mm", value_name = "LENGTH", allow_hyphen_values = true)]
@@ -227,7 +203,7 @@ pub enum Body {
         #[arg(num_args = 3)]
         axes: Vec<String>,
         /// Exponents e1 and e2, 0.1 to 2
-        #[arg(long, num_args = 2, required = true, allow_negative_numbers = true)]
+        #[arg(long, num_args = 2, required = true)]
         exponents: Vec<f64>,
         #[command(flatten)]
         new: NewGrain,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::LazyLock;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use grainwake_run::provenance;
 use grainwake_solver::math::{InstructionSet, Precision};
 
@@ -33,6 +33,22 @@ fn whole<T: FromStr>(text: &str) -> Result<T, String> {
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
+}
+
+impl Cli {
+    /// Reads the command line. Ends the program with a message if it is wrong.
+    pub fn read() -> Cli {
+        let matches = with_negative_values(Cli::command()).get_matches();
+        Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+}
+
+/// Lets all options take negative numbers, so that a number out of range is reported as such and
+/// not as an unknown option.
+fn with_negative_values(command: clap::Command) -> clap::Command {
+    let takes_value = |arg: &clap::Arg| arg.get_action().takes_values() && !arg.is_positional();
+    let accept = |arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg };
+    command.mut_args(accept).mut_subcommands(with_negative_values)
 }
 
 /// Commands.
@@ -75,7 +91,7 @@ pub struct RunArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Number of threads, 0 for all cores, at most 4 per core [default: value of the case]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>)]
     pub threads: Option<usize>,
     /// Continue from the last checkpoint
     #[arg(long, conflicts_with = "force")]
@@ -109,7 +125,7 @@ pub struct CheckArgs {
     /// Case file
     pub case: PathBuf,
     /// Number of threads for the estimated wall time, 0 for all cores [default: value of the case]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole::<usize>)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>)]
     pub threads: Option<usize>,
     #[command(flatten)]
     pub overrides: Overrides,
@@ -127,22 +143,10 @@ pub struct StudyArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Number of concurrent runs
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<usize>)]
     pub jobs: usize,
     /// Number of threads of each run, 0 to share all cores among the jobs
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 0,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<usize>)]
     pub threads: usize,
     /// Select runs: names with * and ?, separated by commas, or the i-th of N equal shares
     #[arg(long, value_name = "PATTERN|i/N")]
@@ -208,22 +212,10 @@ pub struct ValidateArgs {
     #[arg(long)]
     pub list: bool,
     /// Number of concurrent runs
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 1,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<usize>)]
     pub jobs: usize,
     /// Number of threads of each run, 0 to share all cores among the jobs
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 0,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<usize>)]
     pub threads: usize,
     /// Print the table, warnings and errors only
     #[arg(long)]
@@ -248,45 +240,20 @@ pub struct BenchArgs {
         num_args = 3,
         value_names = ["NX", "NY", "NZ"],
         default_values_t = [100, 100, 390],
-        allow_negative_numbers = true,
         value_parser = whole::<usize>
     )]
     pub size: Vec<usize>,
     /// Number of grains, 8 cells across, evenly distributed
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole::<usize>)]
     pub grains: usize,
     /// Number of timed steps
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 10,
-        allow_negative_numbers = true,
-        value_parser = whole::<u64>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = whole::<u64>)]
     pub steps: u64,
     /// Number of untimed steps before
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2,
-        allow_negative_numbers = true,
-        value_parser = whole::<u64>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole::<u64>)]
     pub warm_up: u64,
     /// Number of threads, 0 for all cores
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 2,
-        allow_negative_numbers = true,
-        value_parser = whole::<usize>
-    )]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = whole::<usize>)]
     pub threads: usize,
     /// Coupling scheme
     #[arg(long, default_value = "aperture", value_parser = ["aperture", "paper"])]
@@ -322,13 +289,7 @@ pub struct ViewArgs {
     #[arg(required = true, value_name = "DIR")]
     pub folders: Vec<PathBuf>,
     /// Port on 127.0.0.1; 0 takes any free port
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 8317,
-        conflicts_with = "save",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "N", default_value_t = 8317, conflicts_with = "save")]
     pub port: u16,
     /// Open the page in the default browser
     #[arg(long, conflicts_with = "save")]

@@ -48,8 +48,8 @@ pub struct Grain {
     pub translation: MotionConstraint,
     /// Rotational degrees of freedom.
     pub rotation: MotionConstraint,
-    /// Axis normal to the plane in which the grain moves, if it does: as far as it is free, it does
-    /// not move along this axis and turns about it only.
+    /// Normal axis of the plane in which the grain moves, in a flow with one cell along this axis:
+    /// where its motion is free, it does not move along the axis, and turns about it only.
     pub plane_normal: Option<usize>,
 }
 
@@ -73,22 +73,13 @@ impl Grain {
     pub fn rigid_velocity(&self) -> RigidVelocity {
         RigidVelocity { linear: self.velocity, angular: self.angular_velocity }
     }
-    /// Whether the six degrees of freedom, translation along and rotation about x, y and z, follow
-    /// the equations of motion.
+    /// The degrees of freedom that follow the equations of motion: translation along x, y and z,
+    /// then rotation about x, y and z.
     pub fn free_axes(&self) -> [bool; 6] {
-        let [translates, turns] =
-            [self.translation, self.rotation].map(|c| c == MotionConstraint::Free);
-        std::array::from_fn(|n| match self.plane_normal {
-            Some(normal) if n < 3 => translates && n != normal,
-            Some(normal) => turns && n - 3 == normal,
-            None => {
-                if n < 3 {
-                    translates
-                } else {
-                    turns
-                }
-            }
-        })
+        let free = [self.translation, self.rotation].map(|c| c == MotionConstraint::Free);
+        // In a plane, the grain moves along two axes and turns about the third.
+        let fits = |n: usize| self.plane_normal.is_none_or(|axis| (n < 3) != (n % 3 == axis));
+        std::array::from_fn(|n| free[n / 3] && fits(n))
     }
     /// A vector less its component out of the plane of motion.
     pub fn in_plane(&self, mut vector: DVec3) -> DVec3 {
@@ -110,8 +101,8 @@ impl Grain {
         let rotation = DMat3::from_quat(self.pose.orientation);
         rotation * DMat3::from_diagonal(self.principal_inertia()) * rotation.transpose()
     }
-    /// Angular acceleration at rest under a torque about the centroid, or change of the angular
-    /// velocity by an angular impulse, of a grain that turns freely [space frame].
+    /// Angular acceleration [rad/s^2] of a grain at rest under a torque [N m] about its centroid,
+    /// or change of its angular velocity by an angular impulse; space frame.
     pub fn angular_response(&self, torque: DVec3) -> DVec3 {
         match self.plane_normal {
             Some(n) => torque[n] / self.inertia().col(n)[n] * DVec3::AXES[n],

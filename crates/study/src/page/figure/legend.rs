@@ -1,8 +1,8 @@
 //! Line styles of runs in the overview figures, and their legend.
 
 use grainwake_plot::frame::Fill;
-use grainwake_plot::legend::{Entry, Legend};
-use grainwake_plot::style::{PAGE, SERIES_COLOURS};
+use grainwake_plot::legend::Entry;
+use grainwake_plot::style::SERIES_COLOURS;
 use grainwake_plot::text;
 
 use super::data::FigureData;
@@ -130,13 +130,7 @@ impl LineStyles {
         }
     }
 
-    /// Returns the legend of the `drawn` runs, with symbols or else lines, for a frame with the
-    /// given left edge [pt].
-    pub fn legend(&self, drawn: &[&Run], left: f64, symbols: bool) -> Legend {
-        Legend::new(self.legend_entries(drawn, symbols), PAGE - left)
-    }
-
-    /// Returns the entries of [`LineStyles::legend`].
+    /// Returns the entries of a legend of the `drawn` runs, with symbols or else lines.
     pub fn legend_entries(&self, drawn: &[&Run], symbols: bool) -> Vec<Entry> {
         let entry = |(name, style): (String, LineStyle)| match symbols {
             true => symbol_entry(&name, style),

@@ -5,6 +5,7 @@ use grainwake_plot::Figure;
 use grainwake_plot::axis::{Axis, AxisRange, extent};
 use grainwake_plot::drawing::Drawing;
 use grainwake_plot::frame::{Frame, Labelled};
+use grainwake_plot::legend::Legend;
 use grainwake_plot::style::{LINE, PAGE};
 
 use super::data::FigureData;
@@ -109,7 +110,7 @@ fn against_time(
     let (low, high) = extent(points().map(|p| p.1).chain([0.0]))?;
     let styles = LineStyles::of(data);
     let drawn: Vec<&Run> = curves.iter().map(|(run, _)| *run).collect();
-    let legend = styles.legend(&drawn, LEFT, false);
+    let legend = Legend::new(styles.legend_entries(&drawn, false), PAGE - LEFT);
     if legend.height() == 0.0 {
         texts.caption += " The models are too many for a legend.";
     }
