@@ -434,5 +434,5 @@ fn a_step_is_read_in_few_files() {
     let below = of(",below it");
     let lines: usize = below.iter().sum();
     println!("{} files, {lines} lines", below.len());
-    assert!((20..=40).contains(&below.len()) && (4000..=8200).contains(&lines));
+    assert!((20..=40).contains(&below.len()) && (4000..=8100).contains(&lines));
 }

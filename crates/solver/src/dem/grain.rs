@@ -6,7 +6,6 @@ use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
 use serde::{Deserialize, Serialize};
 
-use super::material::Material;
 use crate::math::{Pose, RigidVelocity};
 
 /// Whether the three components of a velocity follow the equations of motion or are prescribed.
@@ -27,6 +26,30 @@ impl MotionConstraint {
             MotionConstraint::Prescribed(velocity) => velocity,
         }
     }
+}
+
+/// Elastic constants and restitution of one body; the linear contact law does not use them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Young's modulus E [Pa]; infinite for a rigid body.
+    pub youngs_modulus: f64,
+    /// Poisson ratio nu.
+    pub poisson_ratio: f64,
+    /// Coefficient of restitution; a pair takes the smaller of its two values.
+    pub restitution: f64,
+}
+
+impl Default for Material {
+    /// Quartz without dissipation.
+    fn default() -> Self {
+        Material { youngs_modulus: 7e10, poisson_ratio: 0.17, restitution: 1.0 }
+    }
+}
+
+impl Material {
+    /// Undeformable body: the contact takes the elasticity and the restitution of its partner.
+    pub const RIGID: Material =
+        Material { youngs_modulus: f64::INFINITY, poisson_ratio: 0.0, restitution: 1.0 };
 }
 
 /// One grain. Velocities are at integer time levels, in the space frame.
@@ -54,17 +77,6 @@ pub struct Grain {
 }
 
 impl Grain {
-    /// Sets both velocities to zero and prescribes them.
-    pub(super) fn hold(&mut self) {
-        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
-        let held = MotionConstraint::Prescribed(DVec3::ZERO);
-        (self.translation, self.rotation) = (held, held);
-    }
-    /// Removes the grain from the box: it is held at rest at infinity from now on.
-    pub fn leave(&mut self) {
-        self.pose.position = DVec3::INFINITY;
-        self.hold();
-    }
     /// Returns whether the grain has left the box.
     pub fn has_left(&self) -> bool {
         self.pose.position == DVec3::INFINITY

@@ -1,12 +1,11 @@
-//! Set-up of a grain.
+//! Set-up of a grain, and its removal.
 
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use grainwake_shape::Shape;
 
-use super::grain::{Grain, MotionConstraint};
-use super::material::Material;
+use super::grain::{Grain, Material, MotionConstraint};
 use crate::math::{Pose, RigidVelocity};
 
 impl Grain {
@@ -48,6 +47,17 @@ impl Grain {
     pub fn with_angular_velocity(mut self, angular_velocity: DVec3) -> Grain {
         self.angular_velocity = angular_velocity;
         self
+    }
+    /// Sets both velocities to zero and prescribes them.
+    pub(super) fn hold(&mut self) {
+        (self.velocity, self.angular_velocity) = (DVec3::ZERO, DVec3::ZERO);
+        let held = MotionConstraint::Prescribed(DVec3::ZERO);
+        (self.translation, self.rotation) = (held, held);
+    }
+    /// Removes the grain from the box: it is held at rest at infinity from now on.
+    pub fn leave(&mut self) {
+        self.pose.position = DVec3::INFINITY;
+        self.hold();
     }
     /// Holds the grain still.
     pub fn held(mut self) -> Grain {

@@ -5,8 +5,8 @@
 //! 1. `motion`: sub-steps, integrator, rotation, response of the fluid, checkpoint of the contacts;
 //! 2. `contact`: force laws, friction history, lubrication;
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
-//! 4. `grain`, with `grain_setup` and `grain_momentum`, `material` and `enclosure`: the bodies and
-//!    the box.
+//! 4. `grain`, with `grain_setup` and `grain_momentum`, `ranges` of parameters, and `enclosure`: the
+//!    bodies and the box.
 //!
 //! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
 //! penetrating points, evaluate the contact forces and integrate the motion, in sub-steps of the
@@ -17,14 +17,13 @@ mod enclosure;
 mod grain;
 mod grain_momentum;
 mod grain_setup;
-mod material;
 mod motion;
+mod ranges;
 mod search;
 
 pub use contact::{Contact, ContactLawKind, ContactParams};
 pub use enclosure::{Enclosure, Partner, Side};
-pub use grain::{Grain, MotionConstraint};
-pub use material::Material;
+pub use grain::{Grain, Material, MotionConstraint};
 pub use motion::{
     ContactDynamics, GrainResponse, RelativeOverlap, RigidState, TrialStep, rotation,
 };

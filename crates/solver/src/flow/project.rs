@@ -49,7 +49,7 @@ pub struct FacePlanes<'a, R> {
     pub layout: Layout,
     /// Whether each axis is periodic.
     pub periodic: [bool; 3],
-    /// 1/h along each axis [1/m]; zero along an axis of one cell, along which nothing changes.
+    /// [`Mesh::per_spacing`] [1/m].
     pub inverse: [f64; 3],
     /// Lower faces of the cells along each axis.
     lower: [&'a [R]; 3],
@@ -70,8 +70,7 @@ impl<'a, R: Real> FacePlanes<'a, R> {
         FacePlanes {
             layout,
             periodic,
-            inverse: [0, 1, 2]
-                .map(|a| if mesh.is_resolved(a) { 1.0 / mesh.spacing[a] } else { 0.0 }),
+            inverse: mesh.per_spacing().to_array(),
             lower: [layout.plane_of(x, k), layout.plane_of(y, k), layout.plane_of(z, k)],
             above: layout.plane_of(z, next(k, layout.cells[2], periodic[2])),
         }

@@ -2,12 +2,13 @@
 //!
 //! Cells are counted from 1 along each axis; 0 and n + 1 are ghost cells. `field.rs` has the typed
 //! fields, `loops.rs` the loops in a fixed order, `initial.rs` the start of a run, `view.rs` the
-//! values without ghosts.
+//! values without ghosts, `near.rs` the cells near a coordinate.
 
 mod borrowed;
 mod field;
 mod initial;
 mod loops;
+mod near;
 mod view;
 
 pub(crate) use borrowed::{BorrowedRow, ROWS_RECORDED, borrowed_rows};
@@ -67,29 +68,14 @@ impl Mesh {
     pub fn is_resolved(&self, axis: usize) -> bool {
         self.cells[axis] > 1
     }
+    /// 1/h along each axis [1/m]; zero along an axis of one cell, along which nothing changes.
+    pub fn per_spacing(&self) -> DVec3 {
+        let along = |axis| if self.is_resolved(axis) { 1.0 / self.spacing[axis] } else { 0.0 };
+        DVec3::from_array([0, 1, 2].map(along))
+    }
     /// Upper corner of the box [m].
     pub fn upper(&self) -> DVec3 {
         self.origin + self.extent()
-    }
-    /// Cells along `axis` within `reach` [m] of the coordinate `centre` [m], counted from 0, each
-    /// with the distance of its centre from it [m]; across the sides of a `periodic` axis too. A
-    /// flat axis has one such cell.
-    pub(crate) fn cells_near(
-        &self,
-        axis: usize,
-        periodic: bool,
-        centre: f64,
-        reach: f64,
-    ) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
-        let (n, h, origin) = (self.cells[axis] as i64, self.spacing[axis], self.origin[axis]);
-        let index = |x: f64| ((x - origin) / h).floor() as i64;
-        let cells = match (n, periodic) {
-            (1, _) => 0..=0,
-            (_, true) => index(centre - reach)..=index(centre + reach),
-            (_, false) => index(centre - reach).max(0)..=index(centre + reach).min(n - 1),
-        };
-        let distance = move |i: i64| origin + (i as f64 + 0.5) * h - centre;
-        cells.map(move |i| (i.rem_euclid(n) as usize, distance(i)))
     }
     /// Indices [i, j, k] of all cells, from 1 on.
     #[cfg(test)]

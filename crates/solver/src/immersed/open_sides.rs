@@ -16,7 +16,8 @@ use std::sync::Arc;
 use glam::{BVec3, DVec3};
 
 use super::emerged::{EmergedPart, Subvolumes};
-use super::rigid_body::PreviousStep;
+use super::rigid_body::{PreviousStep, RigidBodySystem};
+use super::rigidity::Impulse;
 use crate::dem::Grain;
 use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace, FluidParams};
 use crate::grid::Mesh;
@@ -271,6 +272,29 @@ impl OpenSides {
             }
         }
         loads
+    }
+}
+
+impl RigidBodySystem {
+    /// Impulse on the fluid [N s] of the grain, which has its new velocities.
+    pub fn fluid_impulse(&self, grain: &Grain) -> DVec3 {
+        DVec3::from_slice(&self.impulse.at(grain.rigid_velocity())[..3])
+    }
+
+    /// Assembles the equations of a grain that leaves the box under the `applied` load and the
+    /// hydrodynamic load of the last step, `last_load`, over `dt` [s], without contact.
+    pub fn departing(
+        grain: &Grain,
+        previous: &PreviousStep,
+        impulse: Impulse,
+        [applied, last_load]: [Load; 2],
+        dt: f64,
+    ) -> RigidBodySystem {
+        let last_load = previous.uptake_load(grain).map_or(last_load, |load| last_load + load);
+        let (none, load) = (Impulse::default(), applied + last_load);
+        let mut system = RigidBodySystem::new(grain, previous, none, 0.0, load, None, dt);
+        (system.impulse, system.last_load) = (impulse, Some(last_load));
+        system
     }
 }
 

@@ -80,28 +80,13 @@ pub struct RigidBodySystem {
     matrix: Matrix6,
     right: Vector6,
     virtual_mass: VirtualMass,
-    impulse: Impulse,
+    pub(super) impulse: Impulse,
     surface: Option<EmergedLoads>,
     /// Load of a grain that leaves the box.
-    last_load: Option<Load>,
+    pub(super) last_load: Option<Load>,
 }
 
 impl RigidBodySystem {
-    /// Assembles the equations of a grain that leaves the box under the `applied` load and the
-    /// hydrodynamic load of the last step, `last_load`, over `dt` [s], without contact.
-    pub fn departing(
-        grain: &Grain,
-        previous: &PreviousStep,
-        impulse: Impulse,
-        [applied, last_load]: [Load; 2],
-        dt: f64,
-    ) -> RigidBodySystem {
-        let last_load = previous.uptake_load(grain).map_or(last_load, |load| last_load + load);
-        let (none, load) = (Impulse::default(), applied + last_load);
-        let system = RigidBodySystem::new(grain, previous, none, 0.0, load, None, dt);
-        RigidBodySystem { impulse, last_load: Some(last_load), ..system }
-    }
-
     /// Assembles the equations under the `applied` load (weight less buoyancy, and external loads)
     /// over `dt` [s], without contact. `surface` is the part of the grain beyond a free surface,
     /// and the load of the pressure at this surface.
@@ -121,11 +106,11 @@ impl RigidBodySystem {
         // Mass and inertia less those of the displaced fluid.
         let excess = 1.0 - fluid_density / grain.density;
         let (mass, inertia) = (grain.mass() * excess, grain.inertia() * excess);
-        let old = previous.velocity;
         let virtual_mass = VirtualMass::new(grain, previous, fluid_density, surface.is_some(), dt);
-        let mut linear = mass * old.linear + dt * applied.force + virtual_mass.momentum[0];
+        let mut linear =
+            mass * previous.velocity.linear + dt * applied.force + virtual_mass.momentum[0];
         // With the inertia at the start: Euler's equation for the angular momentum.
-        let start = previous.inertia * excess * old.angular;
+        let start = previous.inertia * excess * previous.velocity.angular;
         let mut angular = start + dt * applied.torque + virtual_mass.momentum[1];
         if previous.was_set() {
             linear += grain.mass() * previous.set_change.linear;
@@ -206,11 +191,6 @@ impl RigidBodySystem {
         self.surface.map_or(load, |surface| load + surface.pressure)
     }
 
-    /// Impulse on the fluid [N s] of the grain, which has its new velocities.
-    pub fn fluid_impulse(&self, grain: &Grain) -> DVec3 {
-        DVec3::from_slice(&self.impulse.at(grain.rigid_velocity())[..3])
-    }
-
     /// Response of the grain to contact in the sub-steps of this step. Without further contact the
     /// grain has the velocities of [`Self::velocities`] at their end
     /// (`docs/decisions/0014-contact-with-the-fluid-response.md`).
@@ -237,9 +217,8 @@ impl RigidBodySystem {
         // The virtual mass returns its momentum in the next step.
         let virtual_mass = if added_density > 0.0 { self.virtual_mass.mass } else { 0.0 };
         let moving = (0..3).filter(|axis| free[*axis]);
-        let mean_mass = moving.clone().map(|axis| a[axis][axis]).sum::<f64>()
-            / moving.clone().count() as f64
-            - virtual_mass;
+        let total: f64 = moving.clone().map(|axis| a[axis][axis]).sum();
+        let mean_mass = total / moving.clone().count() as f64 - virtual_mass;
         for axis in moving {
             a[axis][axis] += (least_mass - mean_mass).max(0.0) - virtual_mass;
         }

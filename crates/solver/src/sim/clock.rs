@@ -13,6 +13,8 @@ pub(super) struct Clock {
     pub steps: u64,
     /// Length of the last step [s]; zero before the first.
     pub last_step: f64,
+    /// 1/h of the finest grid [1/m], 0 along axes of one cell.
+    pub per_spacing: DVec3,
     rule: StepRule,
     /// nu * sum 1/h_a^2 over the resolved axes [1/s]; zero without fluid.
     viscous_rate: f64,
@@ -20,7 +22,7 @@ pub(super) struct Clock {
     /// moves nothing by more than `cfl` cells in it.
     pub longest_next: f64,
     /// `longest_next` of the first step [s].
-    longest_first: f64,
+    pub longest_first: f64,
 }
 
 /// Largest ratio of successive steps within limits, since Adams-Bashforth extrapolates over the
@@ -54,6 +56,7 @@ impl Clock {
             time: 0.0,
             steps: 0,
             last_step: 0.0,
+            per_spacing: setup.refined_mesh().unwrap_or(setup.mesh).per_spacing(),
             rule: setup.step,
             viscous_rate: setup
                 .fluid
@@ -93,17 +96,6 @@ impl Clock {
         if (step - self.last_step).abs() <= ROUNDING * step { self.last_step } else { step }
     }
 
-    /// Limits the next step as the first one.
-    pub fn limit_next_step(&mut self) {
-        self.longest_next = self.longest_first;
-    }
-
-    /// Takes a stored state: only the first step is limited from rest.
-    pub fn restore(&mut self, steps: u64, [time, last_step]: [f64; 2]) {
-        let longest_next = if steps == 0 { self.longest_first } else { f64::INFINITY };
-        *self = Clock { steps, time, last_step, longest_next, ..*self };
-    }
-
     /// Advances the time by `step` [s], exactly to the `horizon` [s] if the step ends there.
     pub fn advance(&mut self, step: f64, horizon: f64) {
         let ends = (step - horizon).abs() <= ROUNDING * step;
@@ -128,6 +120,7 @@ mod tests {
             time: 0.0,
             steps: 1,
             last_step: last,
+            per_spacing: DVec3::ONE,
             rule: StepRule::Limits {
                 cfl: largest,
                 viscous: f64::INFINITY,

@@ -10,10 +10,6 @@ use super::{PrescribedMotion, Setup, Simulation};
 use crate::dem::{Grain, MotionConstraint};
 use crate::math::Load;
 
-/// Largest sum of |u_a| next to a sphere set in motion at once, over that of the sphere: 1.6 with 8
-/// cells across.
-const FLUID_BESIDE: f64 = 1.6;
-
 /// Reason why a grain cannot be controlled.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum ControlError {
@@ -198,24 +194,6 @@ impl Simulation {
             self.clock.longest_next = self.clock.longest_next.min(longest);
         }
         Ok(())
-    }
-
-    /// max(sum |u_a| / h_a) [1/s] that the fluid will have next to grains whose velocities were set
-    /// or prescribed since the last step.
-    pub(super) fn rate_of_set_velocities(&self) -> f64 {
-        let spacing = self.setup.finest_spacing();
-        let per_cell: f64 = self.setup.mesh.resolved_axes().map(|axis| 1.0 / spacing[axis]).sum();
-        let set = self.setup.grains.iter().zip(&self.data.previous).filter(|(grain, previous)| {
-            !grain.has_left() && grain.rigid_velocity() != previous.velocity
-        });
-        let rate = |(grain, _): (&Grain, _)| {
-            let translation: f64 = (self.setup.mesh.resolved_axes())
-                .map(|axis| grain.velocity[axis].abs() / spacing[axis])
-                .sum();
-            let rotation = grain.angular_velocity.length() * grain.shape.bounding_radius();
-            FLUID_BESIDE * translation + rotation * per_cell
-        };
-        set.map(rate).fold(0.0, f64::max)
     }
 
     fn check_control(

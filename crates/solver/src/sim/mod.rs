@@ -137,7 +137,7 @@ impl Simulation {
     /// Limits the length of the next step as that of the first one, for a run that begins with the
     /// state of another, whose gravity may differ.
     pub fn limit_next_step(&mut self) {
-        self.clock.limit_next_step();
+        self.clock.longest_next = self.clock.longest_first;
     }
     /// Simulated time [s].
     pub fn time(&self) -> f64 {

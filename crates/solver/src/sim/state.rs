@@ -56,8 +56,11 @@ impl Simulation {
     /// of the reader.
     pub fn restore(&mut self, reader: &mut dyn Read) -> io::Result<()> {
         let mut input = Decoder::new(reader);
-        let steps = input.u64()?;
-        self.clock.restore(steps, input.numbers()?);
+        self.clock.steps = input.u64()?;
+        [self.clock.time, self.clock.last_step] = input.numbers()?;
+        // Only the first step is limited from rest.
+        self.clock.longest_next =
+            if self.clock.steps == 0 { self.clock.longest_first } else { f64::INFINITY };
         input.expect(self.setup.grains.len(), "grains")?;
         let data = &mut self.data;
         // A grain that has left in the meantime may move again.

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::hertz_mindlin::HertzMindlin;
 use super::law::{BodyProperties, ContactLaw, Linear, PairProperties};
-use crate::dem::grain::Grain;
-use crate::dem::material::{FRACTION, Material, NOT_NEGATIVE, POSITIVE, check};
+use crate::dem::grain::{Grain, Material};
+use crate::dem::ranges::{FRACTION, NOT_NEGATIVE, POSITIVE, check};
 
 /// Force laws of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

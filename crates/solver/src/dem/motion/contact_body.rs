@@ -1,24 +1,21 @@
 //! Grain as a body of the contact sub-steps, and its response to contact in a fluid.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use grainwake_shape::Shape;
-use rayon::prelude::*;
 
-use crate::dem::contact::{BodyProperties, BodyState, SubstepVelocity};
-use crate::dem::grain::{Grain, MotionConstraint};
-use crate::dem::material::Material;
+use crate::dem::contact::{BodyState, SubstepVelocity};
+use crate::dem::grain::{Grain, Material, MotionConstraint};
 use crate::dem::search::{PatchTree, PosedShape};
 use crate::math::{Load, Matrix6, RigidVelocity, Vector6};
 
 /// State of one grain in the contact sub-steps.
 #[derive(Clone, Debug)]
 pub(super) struct ContactBody {
-    shape: Arc<Shape>,
-    tree: Arc<PatchTree>,
-    material: Material,
+    pub shape: Arc<Shape>,
+    pub tree: Arc<PatchTree>,
+    pub material: Material,
     /// State at the last evaluation. The inverse mass is that in a contact, added mass included.
     pub state: BodyState,
     /// Upper bound of the displacement of any surface point since the last evaluation [m].
@@ -64,38 +61,6 @@ impl ContactBody {
                 Some(former) => *former = body,
                 None => bodies.push(body),
             }
-        }
-    }
-
-    /// Trees of the shapes of `grains`, those of new shapes built in parallel.
-    fn trees(bodies: &[ContactBody], grains: &[Grain]) -> HashMap<*const Shape, Arc<PatchTree>> {
-        let known = bodies.iter().map(|body| (Arc::as_ptr(&body.shape), body.tree.clone()));
-        let mut trees: HashMap<_, _> = known.collect();
-        let mut new: Vec<&Arc<Shape>> = grains.iter().map(|grain| &grain.shape).collect();
-        new.retain(|shape| !trees.contains_key(&Arc::as_ptr(shape)));
-        new.sort_by_key(|shape| Arc::as_ptr(shape));
-        new.dedup_by_key(|shape| Arc::as_ptr(shape));
-        let built: Vec<_> = new.par_iter().map(|shape| Arc::new(PatchTree::new(shape))).collect();
-        trees.extend(new.iter().map(|shape| Arc::as_ptr(shape)).zip(built));
-        trees
-    }
-
-    fn new(grain: &Grain, tree: Arc<PatchTree>) -> ContactBody {
-        ContactBody {
-            shape: grain.shape.clone(),
-            tree,
-            material: grain.material,
-            state: BodyState::translating(BodyProperties::of(grain), DVec3::ZERO),
-            displacement: 0.0,
-            velocity: SubstepVelocity::default(),
-            load: Load::default(),
-            contact: Load::default(),
-            mean_contact: Load::default(),
-            response: None,
-            own_inverse_mass: 0.0,
-            speed_gain: 0.0,
-            search_position: DVec3::ZERO,
-            search_margin: 0.0,
         }
     }
 

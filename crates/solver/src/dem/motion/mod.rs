@@ -3,11 +3,13 @@
 //! (`docs/decisions/0014-contact-with-the-fluid-response.md`).
 //!
 //! `substeps.rs` has the contact sub-steps, `contact_body.rs` the state of one grain in them,
-//! `integrator.rs` and `rotation.rs` its motion, `checkpoint.rs` the stored state.
+//! `new_bodies.rs` that of new grains, `integrator.rs` and `rotation.rs` its motion,
+//! `checkpoint.rs` the stored state.
 
 mod checkpoint;
 mod contact_body;
 mod integrator;
+mod new_bodies;
 pub mod rotation;
 mod substeps;
 
