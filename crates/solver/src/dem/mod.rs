@@ -5,7 +5,7 @@
 //! 1. `motion`: sub-steps, integrator, rotation, response of the fluid, checkpoint of the contacts;
 //! 2. `contact`: force laws, friction history, lubrication;
 //! 3. `search`: broad phase, narrow phase, gaps between surfaces;
-//! 4. `grain`, with `grain_setup` and `grain_momentum`, `ranges` of parameters, and `enclosure`: the
+//! 4. `grain`, with `grain_setup` and `grain_momentum`, `ranges` of parameters, `enclosure`: the
 //!    bodies and the box.
 //!
 //! [`ContactDynamics::advance`] takes one step: list the pairs that may touch, find their
