@@ -180,11 +180,11 @@ fn mistyped_keys_and_words_are_corrected() {
 #[test]
 fn a_lubrication_gap_must_exceed_the_roughness() {
     let contact = |line: &str| format!("end = \"1 s\"\n[contact]\n{line}");
-    let words = ["is not above the roughness, 3 um", "lubrication_gap = 0"];
-    let gap = contact("lubrication_gap = \"2 um\"");
+    let words = ["is not above the roughness, 2 um", "lubrication_gap = 0"];
+    let gap = contact("lubrication_gap = \"1.5 um\"");
     refused("end = \"1 s\"", &gap, "contact.lubrication_gap", &words);
-    good(&PAIR.replace("end = \"1 s\"", &gap.replace("2 um", "4 um")));
-    let smooth = contact("lubrication_gap = \"2 um\"\nroughness = \"1 um\"");
+    good(&PAIR.replace("end = \"1 s\"", &gap.replace("1.5 um", "3 um")));
+    let smooth = contact("lubrication_gap = \"1.5 um\"\nroughness = \"1 um\"");
     good(&PAIR.replace("end = \"1 s\"", &smooth));
     // Without grains the default roughness is not known, and the resolved case does without.
     let flow = PAIR.split("[[grain]]").next().unwrap();
@@ -1033,6 +1033,32 @@ fn few_substeps_are_warned_of_for_grains_that_may_be_flat() {
     assert!(!dropped(plate, 12).contains("sub-steps per contact"));
     let sphere = "{ kind = \"sphere\", diameter = \"2 mm\" }";
     assert!(!dropped(sphere, 5).contains("sub-steps per contact"));
+}
+
+#[test]
+fn a_lubrication_gap_other_than_one_cell_of_the_finest_grid_is_warned_of() {
+    let of = |gap: &str, refinement: &str| {
+        warnings(&format!(
+            "[fluid]\ndensity = 1000\nkinematic_viscosity = 1e-6\n[domain]\n\
+             size = [\"12 mm\", \"12 mm\", \"24 mm\"]\ncell_size = \"0.25 mm\"\n{refinement}\n\
+             [contact]\nlubrication_gap = \"{gap}\"\n[time]\nend = \"1 s\"\n[[grain]]\n\
+             shape = {{ kind = \"sphere\", diameter = \"2 mm\" }}\ndensity = 1100\n\
+             position = [\"6 mm\", \"6 mm\", \"12 mm\"]\n"
+        ))
+    };
+    let refined = "refinement = 2";
+    for (gap, refinement, amount) in
+        [("0.4 mm", "", "large"), ("0.1 mm", "", "small"), ("0.25 mm", refined, "large")]
+    {
+        let found = of(gap, refinement);
+        let cell = if refinement.is_empty() { "0.25 mm" } else { "0.125 mm" };
+        let words =
+            format!("if lubrication_gap is one cell, {cell}; that of {gap} is too {amount}");
+        assert!(found.contains(&words), "{found}");
+    }
+    for (gap, refinement) in [("0.25 mm", ""), ("0.125 mm", refined), ("0 mm", "")] {
+        assert!(!of(gap, refinement).contains("lubrication"), "{gap}");
+    }
 }
 
 #[test]

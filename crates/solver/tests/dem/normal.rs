@@ -306,7 +306,8 @@ fn mean_contact_is_the_impulse_of_the_step() {
 
 #[test]
 fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
-    // Two equal spheres: F = 6 pi mu R_eq^2 v (1/h - 1/h0), R_eq = R/2, from a prescribed approach.
+    // Two equal spheres: F = 6 pi mu R_eq^2 v (1/h - 1/h_g), R_eq = R/2, h_g = h + 0.07 (h0 - h),
+    // from a prescribed approach.
     let (radius, viscosity, range) = (1e-3, 0.1, 1e-4);
     let params = ContactParams {
         lubrication_gap: range,
@@ -330,7 +331,8 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
     };
     let expected = |gap: f64, speed: f64| {
         let r = 0.5 * radius;
-        6.0 * std::f64::consts::PI * viscosity * r * r * speed * (1.0 / gap - 1.0 / range)
+        let grid_film = gap + 0.07 * (range - gap);
+        6.0 * std::f64::consts::PI * viscosity * r * r * speed * (1.0 / gap - 1.0 / grid_film)
     };
     for gap in [5e-6, 2e-5, 8e-5] {
         for speed in [0.01, -0.02] {
@@ -344,6 +346,34 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
     assert_eq!(force(1.1e-4, 0.01), DVec3::ZERO);
     // In contact only the spring acts.
     assert!((force(-1e-5, 0.0).z / (1e3 * 1e-5) - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn lubrication_acts_at_a_wall_up_to_its_whole_range() {
+    // F = 6 pi mu R^2 v (1/h - 1/h_g), h_g = h + 0.35 (h0 - h).
+    let (radius, viscosity, range, speed) = (1e-3, 0.1, 5e-4, 1e-3);
+    let params = ContactParams {
+        lubrication_gap: range,
+        lubrication_viscosity: viscosity,
+        roughness: 1e-6,
+        ..smooth(1e3)
+    };
+    let force = |gap: f64| {
+        let mut grain = sphere(radius, 2500.0, 1000, DVec3::Z * (radius + gap));
+        grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
+        grain.translation = MotionConstraint::Prescribed(-speed * DVec3::Z);
+        let mut mean = [Load::default()];
+        ContactDynamics::new(params, floor()).advance(&mut [grain], &[], 1e-9, &mut mean);
+        mean[0].force.z
+    };
+    for share in [0.1, 0.4, 0.6, 0.9] {
+        let gap = share * range;
+        let grid_film = gap + 0.35 * (range - gap);
+        let strength = 6.0 * std::f64::consts::PI * viscosity * radius * radius * speed;
+        let expected = strength * (1.0 / gap - 1.0 / grid_film);
+        assert!((force(gap) / expected - 1.0).abs() < 1e-3, "{share}: {}", force(gap) / expected);
+    }
+    assert_eq!(force(1.1 * range), 0.0);
 }
 
 #[test]
@@ -369,7 +399,8 @@ fn a_contact_turns_the_added_mass_as_well() {
 
 #[test]
 fn a_film_takes_its_speed_whatever_the_step() {
-    // m dv = -6 pi mu R^2 (1/h - 1/h0) dh down to the asperities, the thinnest film below them.
+    // m dv = -6 pi mu R^2 (1/h - 1/h_g) dh, h_g = h + s (h0 - h), down to the asperities, the
+    // thinnest film below them.
     let (radius, viscosity, range, roughness) = (3e-3, 0.1, 7.5e-4, 9e-6);
     let params = ContactParams {
         lubrication_gap: range,
@@ -388,8 +419,11 @@ fn a_film_takes_its_speed_whatever_the_step() {
             dynamics.advance(&mut grains, &[], dt, &mut mean);
             time += dt;
         }
+        let s = 0.35;
+        let thinnest = roughness + s * (range - roughness);
         let once = 6.0 * std::f64::consts::PI * viscosity * radius * radius / mass
-            * ((range / roughness).ln() - 1.0 + roughness / range + 1.0 - roughness / range);
+            * ((range / roughness).ln() - (range / thinnest).ln() / (1.0 - s) + 1.0
+                - roughness / thinnest);
         let expected = 0.5 - 2.0 * once;
         let rebound = grains[0].velocity.z;
         assert!((rebound / expected - 1.0).abs() < 0.02, "dt {dt}: {rebound} against {expected}");

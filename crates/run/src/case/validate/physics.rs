@@ -18,8 +18,8 @@ use grainwake_solver::sim::Prescription;
 const MAXIMUM_OVERLAP: f64 = 0.01;
 /// Default of the overlap at which a run stops [diameters].
 const OVERLAP_LIMIT: f64 = 0.1;
-/// Default of the roughness, relative to the smallest equal-volume radius.
-const ROUGHNESS: f64 = 3e-3;
+/// Default of the roughness [smallest equivalent diameters].
+const ROUGHNESS: f64 = 1e-3;
 /// Added mass of a sphere in contact, relative to the displaced fluid.
 ///
 /// Potential flow gives 0.5 far from a wall and 0.803 at it (Hicks 1879). With 0.8 an undamped
@@ -146,7 +146,7 @@ pub(super) fn contact(
     let lubrication_gap = check.not_negative(&raw.lubrication_gap);
     let roughness = match &raw.roughness {
         Some(given) => check.positive(given, "the roughness"),
-        None => Some(ROUGHNESS * 0.5 * smallest_diameter(grains)),
+        None => Some(ROUGHNESS * smallest_diameter(grains)),
     };
     let substeps = check.within(&raw.substeps_per_contact, 5.0, 1e6);
     if let Some(limit) = &raw.overlap_limit {

@@ -1,7 +1,7 @@
 //! Warnings about contact.
 
 use crate::case::settling::{impact_speed, is_free, terminal_speed};
-use crate::number_format::number;
+use crate::number_format::{length, number};
 use grainwake_shape::Field;
 use grainwake_solver::dem::{
     ContactDynamics, ContactLawKind, ContactParams, Grain, initial_overlaps,
@@ -14,6 +14,8 @@ const WARNED_OVERLAP: f64 = 0.05;
 
 /// Ratio of contact forces and weight at the start from which contact is out of balance.
 const UNBALANCED: f64 = 3.0;
+/// Lubrication gap [cells] from which the force is too large, and its inverse too small.
+const ONE_CELL: f64 = 1.25;
 /// Time over which the contact forces at the start act [s]; the grains hardly move.
 const MOMENT: f64 = 1e-12;
 
@@ -51,6 +53,23 @@ pub(super) fn few_substeps(setup: &Setup) -> Option<String> {
             number(defaults)
         )
     })
+}
+
+/// A lubrication force that does not complete the film that the grid resolves.
+pub(super) fn film_off_the_grid(setup: &Setup) -> Option<String> {
+    let gap = setup.contact.lubrication_gap;
+    let cell = setup.finest_spacing().min_element();
+    let amount = match gap / cell {
+        _ if gap == 0.0 => return None,
+        ratio if ratio > ONE_CELL => "large",
+        ratio if ratio < 1.0 / ONE_CELL => "small",
+        _ => return None,
+    };
+    Some(format!(
+        "the lubrication force completes the film of the grid if lubrication_gap is one cell, {}; that of {} is too {amount}",
+        length(cell),
+        length(gap)
+    ))
 }
 
 /// Contacts at the start that do not carry the weight: the stiffness is not that of the run in

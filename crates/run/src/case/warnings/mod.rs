@@ -37,6 +37,7 @@ pub(super) fn warnings(
     found.extend(contact::deep_impacts(setup));
     found.extend(contact::long_substeps(setup));
     found.extend(contact::few_substeps(setup));
+    found.extend(contact::film_off_the_grid(setup));
     found.extend(contact::start_out_of_balance(setup));
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));

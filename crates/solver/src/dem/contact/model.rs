@@ -14,6 +14,7 @@
 //! A single point receives Eq. 9. Dashpot and friction are shared by the weights. Friction is an
 //! incremental spring with Coulomb's bound (Eqs 12-15).
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
@@ -27,6 +28,8 @@ use crate::math::{Load, RigidVelocity};
 /// Exponent p of the overlaps in the weights of a patch. A larger one brings D closer to the
 /// deepest overlap and makes a flat patch stiffer against tilting, which needs shorter sub-steps.
 const EXPONENT: i32 = 8;
+/// s between grains and at a wall (`docs/decisions/0030-lubrication.md`).
+const GRID_FILM: [f64; 2] = [0.07, 0.35];
 
 /// Effective overlap of a patch, and means over its points with the weights w_i.
 #[derive(Clone, Copy, Debug, Default)]
@@ -101,8 +104,7 @@ impl ContactModel {
 
     /// Largest gap at which a pair interacts [m], by lubrication; zero without it.
     pub fn range(&self) -> f64 {
-        let ContactParams { lubrication_viscosity, lubrication_gap, .. } = self.params;
-        if lubrication_viscosity > 0.0 { lubrication_gap.max(0.0) } else { 0.0 }
+        if self.params.lubrication_viscosity > 0.0 { self.params.lubrication_gap } else { 0.0 }
     }
 
     /// Evaluates the loads of a pair with the coefficient `friction` at the end of a sub-step of
@@ -187,8 +189,9 @@ impl ContactModel {
         record.in_contact = true;
     }
 
-    /// Leading-order squeeze-film force between the equal-volume spheres,
-    /// 6 pi mu R*^2 v_n (1/h - 1/h_0), with h at least the height of the asperities.
+    /// Squeeze-film force between the equal-volume spheres that the grid does not resolve,
+    /// 6 pi mu R*^2 v_n (1/h - 1/h_g), with h at least the height of the asperities. The grid
+    /// itself resists like a film of the thickness h_g = h + s (h_0 - h).
     fn lubrication(
         &self,
         closest: &ContactPoint,
@@ -197,16 +200,14 @@ impl ContactModel {
     ) -> PairLoads {
         let (params, range) = (&self.params, self.range());
         let ContactPoint { overlap, lever_arm, normal, .. } = *closest;
-        let gap = -overlap;
-        if gap.max(0.0) >= range {
+        let film = params.roughness.max(-overlap);
+        if film >= range {
             return PairLoads::default();
         }
-        let strength = 6.0
-            * std::f64::consts::PI
-            * params.lubrication_viscosity
-            * properties.reduced_radius.powi(2);
-        let film = gap.max(params.roughness).min(range);
-        let resistance = strength * (1.0 / film - 1.0 / range);
+        let strength = 6.0 * PI * params.lubrication_viscosity * properties.reduced_radius.powi(2);
+        let share = GRID_FILM[usize::from(pair.bodies[1].properties.radius.is_infinite())];
+        let grid_film = film + share * (range - film);
+        let resistance = strength * (1.0 / film - 1.0 / grid_film);
         let resistance = pair.stable_damping(resistance, lever_arm, normal);
         let approach = pair.relative_velocity(lever_arm, |v| v.end).dot(normal);
         let [on_grain, on_partner] = pair.loads(-resistance * approach * normal, lever_arm);
@@ -368,8 +369,7 @@ impl FrictionStep {
         let displacement = -(force + viscous) / self.stiffness;
         // A dashpot that reaches the bound alone must not wind the spring backwards: the friction
         // would lag behind a normal force that grows.
-        let backwards = displacement.dot(force) > 0.0;
-        (force, if backwards { DVec3::ZERO } else { displacement })
+        (force, if displacement.dot(force) > 0.0 { DVec3::ZERO } else { displacement })
     }
 }
 

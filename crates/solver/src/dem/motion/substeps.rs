@@ -90,7 +90,6 @@ impl ContactDynamics {
     /// (Verlet list).
     fn search_pairs(&mut self, grains: &[Grain], dt: f64) {
         self.spheres.clear();
-        let reach = 0.5 * self.model.range();
         for (grain, body) in grains.iter().zip(&mut self.bodies) {
             let load = body.load + body.contact;
             body.own_inverse_mass = grain.inverse_mass(0.0);
@@ -115,7 +114,7 @@ impl ContactDynamics {
             body.search_margin = speed * dt + SKIN * radius;
             self.spheres.push(BoundingSphere {
                 centre: grain.pose.position,
-                radius: radius + body.search_margin + reach,
+                radius: radius + body.search_margin + self.model.range(),
             });
         }
         self.broad_phase.search(&self.spheres, &self.enclosure);
