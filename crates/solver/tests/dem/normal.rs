@@ -431,6 +431,31 @@ fn a_film_takes_its_speed_whatever_the_step() {
 }
 
 #[test]
+fn a_sphere_falls_through_a_thin_film_at_the_speed_of_its_load() {
+    // F = 6 pi mu R^2 v (1/h - 1/h_g); the film stops the sphere within a hundredth of the step.
+    let (radius, gap, range, viscosity, load) = (1e-3, 2e-5, 2.5e-4, 10.0, 1e-3);
+    let params = ContactParams {
+        lubrication_gap: range,
+        lubrication_viscosity: viscosity,
+        roughness: 1e-6,
+        ..smooth(1e3)
+    };
+    let mut grains = [sphere(radius, 1500.0, 600, DVec3::Z * (radius + gap))];
+    let mut dynamics = ContactDynamics::new(params, floor());
+    let loads = [Load { force: -load * DVec3::Z, torque: DVec3::ZERO }];
+    for _ in 0..20 {
+        dynamics.advance(&mut grains, &loads, 1e-3, &mut [Load::default()]);
+    }
+    let left = grains[0].pose.position.z - radius;
+    let grid_film = left + 0.35 * (range - left);
+    let resistance = 6.0 * std::f64::consts::PI * viscosity * radius * radius;
+    let expected = load / (resistance * (1.0 / left - 1.0 / grid_film));
+    let speed = -grains[0].velocity.z;
+    assert!((0.3 * gap..0.99 * gap).contains(&left), "{left}");
+    assert!((speed / expected - 1.0).abs() < 0.01, "{speed} against {expected}");
+}
+
+#[test]
 fn a_thick_film_slows_a_sphere_in_steps_of_one_substep() {
     // The explicit force of the film would reverse the speed many times over in a sub-step.
     let (radius, gap) = (1e-3, 5e-6);

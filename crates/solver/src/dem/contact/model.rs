@@ -88,7 +88,6 @@ impl PatchMean {
 /// Contact model: the force law, Coulomb friction and lubrication.
 #[derive(Clone, Debug)]
 pub(in crate::dem) struct ContactModel {
-    /// Parameters.
     pub params: ContactParams,
     /// Force law.
     pub law: Arc<dyn ContactLaw>,
@@ -160,9 +159,8 @@ impl ContactModel {
             let approach = pair.relative_velocity(point.lever_arm, |v| v.end).dot(point.normal);
             let damping = pair.stable_damping(damping, point.lever_arm, point.normal);
             let normal_force = self.law.normal_force(elastic_force, damping, approach);
-            let dashpot_force = share * (normal_force - elastic_force);
-            let mut force =
-                -(at.normal_force * derivative * point.slope + dashpot_force) * point.normal;
+            let dashpot = share * (normal_force - elastic_force);
+            let mut force = -(at.normal_force * derivative * point.slope + dashpot) * point.normal;
             if friction.stiffness > 0.0 && friction.coefficient > 0.0 {
                 while record.history.get(known).is_some_and(|h| h.id < point.id) {
                     known += 1;
@@ -189,9 +187,13 @@ impl ContactModel {
         record.in_contact = true;
     }
 
-    /// Squeeze-film force between the equal-volume spheres that the grid does not resolve,
-    /// 6 pi mu R*^2 v_n (1/h - 1/h_g), with h at least the height of the asperities. The grid
-    /// itself resists like a film of the thickness h_g = h + s (h_0 - h).
+    /// Resistance 6 pi mu R*^2 / h [N s/m] of a film between the equal-volume spheres.
+    pub fn film_resistance(&self, pair: &PairProperties, film: f64) -> f64 {
+        6.0 * PI * self.params.lubrication_viscosity * pair.reduced_radius.powi(2) / film
+    }
+
+    /// Force of a film h, at least as thick as the asperities are high, less that of a film
+    /// h_g = h + s (h_0 - h), which the grid resolves.
     fn lubrication(
         &self,
         closest: &ContactPoint,
@@ -204,11 +206,10 @@ impl ContactModel {
         if film >= range {
             return PairLoads::default();
         }
-        let strength = 6.0 * PI * params.lubrication_viscosity * properties.reduced_radius.powi(2);
         let share = GRID_FILM[usize::from(pair.bodies[1].properties.radius.is_infinite())];
         let grid_film = film + share * (range - film);
-        let resistance = strength * (1.0 / film - 1.0 / grid_film);
-        let resistance = pair.stable_damping(resistance, lever_arm, normal);
+        let [thin, resolved] = [film, grid_film].map(|h| self.film_resistance(properties, h));
+        let resistance = pair.stable_damping(thin - resolved, lever_arm, normal);
         let approach = pair.relative_velocity(lever_arm, |v| v.end).dot(normal);
         let [on_grain, on_partner] = pair.loads(-resistance * approach * normal, lever_arm);
         PairLoads { overlap, on_grain, on_partner, lever_arm, normal, elastic_energy: 0.0 }
@@ -357,8 +358,7 @@ impl FrictionStep {
         let displacement = earlier + self.time_in_contact * tangential(velocity);
         let sliding = tangential(pair.relative_velocity(point.lever_arm, |v| v.end));
         let direction = sliding.normalize_or_zero();
-        let damping = pair.stable_damping(self.damping, point.lever_arm, direction);
-        let viscous = damping * sliding;
+        let viscous = pair.stable_damping(self.damping, point.lever_arm, direction) * sliding;
         let force = -(self.stiffness * displacement + viscous);
         // Coulomb's bound (Eq. 15); an attractive normal force carries no friction.
         let limit = self.coefficient * normal_force.max(0.0);

@@ -84,10 +84,8 @@ impl ContactDynamics {
         done
     }
 
-    /// Lists the pairs that may touch within `dt` [s].
-    ///
-    /// A bounding sphere grows by the displacement of its grain under the present loads and a skin
-    /// (Verlet list).
+    /// Lists the pairs that may touch within `dt` [s] (Verlet list): a bounding sphere grows by the
+    /// displacement of its grain under the present loads, a skin and the range of lubrication.
     fn search_pairs(&mut self, grains: &[Grain], dt: f64) {
         self.spheres.clear();
         for (grain, body) in grains.iter().zip(&mut self.bodies) {
@@ -141,7 +139,8 @@ impl ContactDynamics {
 
     /// Number of sub-steps for `dt` [s] that the shortest contact time asks for.
     fn contact_substeps(&self, dt: f64) -> f64 {
-        let (mut shortest, mut fastest, mut any_movable) = (f64::INFINITY, 0.0_f64, false);
+        let ContactParams { substeps_per_contact, roughness, .. } = self.model.params;
+        let (mut shortest, mut fastest, mut film_rate) = (f64::INFINITY, 0.0_f64, 0.0_f64);
         for record in &self.records {
             let (body, partner) = self.bodies_of(&record.key);
             let speed = body.surface_speed_relative_to(partner);
@@ -152,18 +151,18 @@ impl ContactDynamics {
                 // The pair gains speed from the known loads.
                 let gain = body.speed_gain + partner.map_or(0.0, |partner| partner.speed_gain);
                 let overlap = record.loads.overlap.max(0.0);
-                let time = self.model.law.contact_time(&pair, speed + gain, overlap);
-                (shortest, any_movable) = (shortest.min(time), true);
+                shortest = shortest.min(self.model.law.contact_time(&pair, speed + gain, overlap));
+                let closest = record.closest.filter(|_| record.may_interact);
+                let film = closest.map_or(f64::INFINITY, |point| roughness.max(-point.overlap));
+                let resistance = self.model.film_resistance(&pair, film);
+                film_rate = film_rate.max(resistance * pair.inverse_mass);
             }
         }
-        if !any_movable {
-            return 1.0;
-        }
-        let ContactParams { substeps_per_contact, roughness, .. } = self.model.params;
         let mut longest_step = shortest / substeps_per_contact;
         if self.model.range() > 0.0 && roughness > 0.0 {
-            // No pair closes its lubrication film by more than half the height of the asperities.
-            longest_step = longest_step.min(0.5 * roughness / fastest);
+            // No pair closes its lubrication film by more than half the height of the asperities,
+            // and no film takes more than half of a speed.
+            longest_step = longest_step.min(0.5 * roughness / fastest).min(0.5 / film_rate);
         }
         dt / longest_step
     }
