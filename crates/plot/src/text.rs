@@ -68,7 +68,8 @@ pub fn literal(text: &str) -> String {
     out
 }
 
-/// Returns a name as a label of at most `most` [pt] at a text size [pt]; a long one lacks its middle.
+/// Returns a name as a label of at most `most` [pt] at a text size [pt]. A long name lacks its
+/// middle.
 pub fn fitting(name: &str, size: f64, most: f64) -> String {
     let all: Vec<char> = name.chars().collect();
     let shortened = |kept: usize| {

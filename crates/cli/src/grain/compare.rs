@@ -1,10 +1,11 @@
 //! `grain compare`.
 
 use comfy_table::Table;
-use grainwake_shape::render::Picture;
+use grainwake_report::grain_sheet::{self, GrainPanel};
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
 
+use super::drawn;
 use super::may_draw;
 use crate::args::CompareArgs;
 use crate::exit::Exit;
@@ -30,12 +31,13 @@ pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
         print(&surfaces(&comparison, first.equivalent_diameter()))?;
     }
     if let Some(path) = &args.picture {
-        let width = 2.1 * first.bounding_radius().max(second.bounding_radius());
-        let rows = [
-            Picture::sides(&first, glam::DMat3::IDENTITY, 320, width, false),
-            Picture::sides(&second, comparison.turn, 320, width, false),
+        let width = grain_sheet::window(&first).max(grain_sheet::window(&second));
+        let names = drawn::names(&[&args.first, &args.second]);
+        let panels = vec![
+            GrainPanel::sides(&names[0], &first, glam::DMat3::IDENTITY, drawn::SIDE, width, false),
+            GrainPanel::sides(&names[1], &second, comparison.turn, drawn::SIDE, width, false),
         ];
-        Picture::sheet(&rows, 1).save(path)?;
+        drawn::save(path, panels, 1)?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `grainwake grain`: creates, inspects and compares `.grain` files.
 
 mod compare;
+mod drawn;
 mod export;
 mod family;
 mod make;
@@ -13,9 +14,9 @@ mod table;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_run::case::parse_length;
 use grainwake_run::check_grain_size;
-use grainwake_shape::render::Picture;
 use grainwake_shape::{Shape, ShapeOptions};
 
 use crate::args::{GrainCommand, InfoArgs, NewGrain};
@@ -197,15 +198,15 @@ fn info(args: &InfoArgs) -> Result<(), Exit> {
         may_draw("--picture", picture, &inputs)?;
     }
     let mut pictures = Vec::new();
-    for path in &args.files {
+    for (path, name) in args.files.iter().zip(drawn::names(&args.files)) {
         let shape = Shape::load(path)?;
         show(&shape, path, args.json)?;
         if args.picture.is_some() {
-            pictures.push(Picture::three_sides(&shape, 320, true));
+            pictures.push(GrainPanel::three_sides(&name, &shape, drawn::SIDE, true));
         }
     }
     if let Some(path) = &args.picture {
-        Picture::sheet(&pictures, 1).save(path)?;
+        drawn::save(path, pictures, 1)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_shape::render::{Picture, View};
+use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_shape::scan::{
     Scan, ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
 };
@@ -14,8 +14,8 @@ use serde_json::json;
 use super::preview;
 use super::refused::{advice, lines, named};
 use super::{
-    create, diameter, folder, length, may_draw, may_write, not_input, options, plausible, save,
-    sized,
+    create, diameter, drawn, folder, length, may_draw, may_write, not_input, options, plausible,
+    save, sized,
 };
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
@@ -79,7 +79,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     }
     grey_notes(&scan.grains).iter().for_each(|note| tell!("note: {note}"));
     if let Some(picture) = &args.preview {
-        preview::draw(picture, args, &volume, &scan)?;
+        preview::draw(picture, args, how.voxel, &volume, &scan)?;
         let lines = treated(&scan.grains).into_iter().chain(lines(&scan.refusals, args.rescue));
         lines.for_each(|line| tell!("{line}"));
         let kept = scan.grains.iter().filter(|g| g.shape.is_ok()).count();
@@ -195,7 +195,8 @@ fn tables(place: &Path) -> [PathBuf; 3] {
 fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exit> {
     let Scan { mut grains, labels, refusals, .. } = scan;
     let place = &args.new.output;
-    let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
+    let name = |label: u32| format!("label-{label:05}");
+    let path = |label: u32| place.join(name(label) + ".grain");
     let [table, sheet, image] = tables(place);
     let earlier = earlier(place);
     if let Some(diameter) = diameter {
@@ -225,7 +226,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     let advice = advice(&grains);
     let treated = treated(&grains);
     let rejected = grains.iter().filter(|g| g.shape.is_err()).count();
-    let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
+    let pictured: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
     let outcomes: Vec<_> = grains
         .into_par_iter()
         .filter_map(|grain| {
@@ -234,10 +235,10 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
             let written = shape.ok().map(|shape| {
                 let file = path(label);
                 shape.save(&file)?;
-                let picture = drawn.binary_search(&label).is_ok().then(|| {
-                    let width = 2.1 * shape.bounding_radius();
-                    Picture::of(&shape, View::BROAD, SHEET.0, width, false)
-                });
+                let picture = pictured
+                    .binary_search(&label)
+                    .is_ok()
+                    .then(|| GrainPanel::broad(&name(label), &shape, SHEET.0));
                 Ok::<_, Exit>((file, shape.record(), picture))
             })?;
             Some((label, voxels, shared_surface, specks, rescued, written))
@@ -247,7 +248,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     let (mut shared, mut removed) = (Vec::new(), Vec::new());
     for (label, voxels, shared_surface, specks, rescued, written) in outcomes {
         let (file, record, picture) = written?;
-        pictures.extend(picture.map(|picture| picture.numbered(label)));
+        pictures.extend(picture);
         if args.new.common.json {
             let rescued = rescued.map(|cure| cure.to_string());
             print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "specks_removed": specks, "rescued": rescued, "file": file, "record": record }).to_string())?;
@@ -260,7 +261,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
                 record.krumbein_sphericity
             ))?;
         }
-        rows.push((format!("label-{label:05}"), record));
+        rows.push((name(label), record));
         shared.push(shared_surface);
         removed.push(specks);
     }
@@ -284,7 +285,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
         );
     }
     write_table(&table, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
-    Picture::sheet(&pictures, SHEET.1).save(&sheet)?;
+    drawn::save(&sheet, pictures, SHEET.1)?;
     labels.save_labels(&image)?;
     Ok(())
 }
