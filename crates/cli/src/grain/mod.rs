@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_run::case::parse_length;
 use grainwake_run::check_grain_size;
-use grainwake_shape::{Shape, ShapeOptions};
+use grainwake_shape::{Shape, ShapeOptions, check_length};
 
 use crate::args::{GrainCommand, InfoArgs, NewGrain};
 use crate::exit::{Exit, IO};
@@ -66,9 +66,14 @@ fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
     check_grain_size(shape).map_err(|message| Exit::refused(message, help))
 }
 
-/// Parses `--equivalent-diameter` [m].
+/// Parses `--equivalent-diameter` [m], before the work starts.
 fn diameter(new: &NewGrain) -> Result<Option<f64>, Exit> {
-    new.equivalent_diameter.as_ref().map(|text| length("--equivalent-diameter", text)).transpose()
+    let Some(text) = &new.equivalent_diameter else {
+        return Ok(None);
+    };
+    let diameter = length("--equivalent-diameter", text)?;
+    check_length("--equivalent-diameter", diameter)?;
+    Ok(Some(diameter))
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {

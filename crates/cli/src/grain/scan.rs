@@ -15,7 +15,7 @@ use super::preview;
 use super::refused::{advice, lines, named};
 use super::{
     create, diameter, drawn, folder, length, may_draw, may_write, not_input, options, plausible,
-    save, sized,
+    save, sized, table,
 };
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
@@ -109,6 +109,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
             ));
         }
     };
+    treated(std::slice::from_ref(&grain)).iter().for_each(|line| tell!("{line}"));
     save(&sized(grain.shape?, diameter, "--voxel")?, &args.new)
 }
 
@@ -145,7 +146,11 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
 /// Fraction of the surface cut from neighbours above which the roundness is doubtful.
 const MUCH_SHARED: f64 = 0.01;
 
-/// Describes what was changed on grains: specks removed, and labels rescued, by cure.
+/// Smallest share of filled cavities in the volume of a grain that is told.
+const CAVITIES_TOLD: f64 = 1e-3;
+
+/// Describes what was changed on grains: specks removed, cavities filled, and labels rescued, by
+/// cure.
 fn treated(grains: &[ScannedGrain]) -> Vec<String> {
     let mut lines = Vec::new();
     let cleaned: Vec<&ScannedGrain> = grains.iter().filter(|g| g.specks_removed() > 0.0).collect();
@@ -156,6 +161,18 @@ fn treated(grains: &[ScannedGrain]) -> Vec<String> {
             "specks removed from {}, at most {:.2} % of the volume: {}",
             count(labels.len(), "grain"),
             100.0 * most.max(5e-5),
+            named(&labels)
+        ));
+    }
+    let hollow = grains.iter().filter(|g| g.cavities_filled() >= CAVITIES_TOLD);
+    let hollow: Vec<&ScannedGrain> = hollow.collect();
+    let most = hollow.iter().map(|g| g.cavities_filled()).fold(0.0, f64::max);
+    let labels: Vec<u32> = hollow.iter().map(|g| g.label).collect();
+    if !labels.is_empty() {
+        lines.push(format!(
+            "cavities filled in {}, at most {:.2} % of the volume: {}",
+            count(labels.len(), "grain"),
+            100.0 * most,
             named(&labels)
         ));
     }
@@ -197,7 +214,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     let place = &args.new.output;
     let name = |label: u32| format!("label-{label:05}");
     let path = |label: u32| place.join(name(label) + ".grain");
-    let [table, sheet, image] = tables(place);
+    let [table_file, sheet, image] = tables(place);
     let earlier = earlier(place);
     if let Some(diameter) = diameter {
         for grain in &mut grains {
@@ -213,7 +230,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     if let Some((_, shape)) = largest.filter(|_| diameter.is_none()) {
         plausible(shape, "--voxel")?;
     }
-    for file in [&table, &sheet, &image] {
+    for file in [&table_file, &sheet, &image] {
         not_input(file, &args.image)?;
     }
     // Grains of an earlier command are not part of the new table and label image.
@@ -254,10 +271,11 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
             print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "specks_removed": specks, "rescued": rescued, "file": file, "record": record }).to_string())?;
         } else {
             print(&format!(
-                "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
+                "{}  {} voxels, equivalent diameter {}, Krumbein sphericity {:.3}",
                 file.display(),
                 voxels,
-                1e3 * record.equivalent_diameter_m,
+                table::LengthUnit::of(record.equivalent_diameter_m)
+                    .text(record.equivalent_diameter_m, 4),
                 record.krumbein_sphericity
             ))?;
         }
@@ -281,10 +299,10 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
             "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}); their roundness is measured away from the cuts, and missing where too little surface remains",
             rows.len(),
             100.0 * MUCH_SHARED,
-            table.display()
+            table_file.display()
         );
     }
-    write_table(&table, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
+    write_table(&table_file, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
     drawn::save(&sheet, pictures, SHEET.1)?;
     labels.save_labels(&image)?;
     Ok(())
