@@ -8,6 +8,7 @@ use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
+use super::factor_unit::label_with_unit;
 use super::line_style::{LineStyle, OUTSIDE};
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
@@ -107,6 +108,12 @@ impl FigureData<'_> {
     pub fn fitting_label(&self, factor: &str, value: f64, width: f64) -> String {
         let label = self.factor_label(factor, value);
         if text::width(&label, TEXT) <= width { label } else { self.factor_value(factor, value) }
+    }
+
+    /// Returns the label of the axis of a quantity or factor; of a factor with its unit, if a
+    /// setting of the study file has it.
+    pub fn axis_label(&self, name: &str) -> String {
+        label_with_unit(&self.whole.runs, name)
     }
 
     /// Returns the symbol of a factor of rows or columns: its first letter in italics; its name if
