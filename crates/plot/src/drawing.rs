@@ -26,8 +26,42 @@ pub enum Anchor {
 pub struct Drawing {
     width: f64,
     height: f64,
-    rasters: Vec<(f64, f64, f64, f64, Raster)>,
+    images: Vec<Placed>,
     vectors: String,
+}
+
+/// Image that fills a rectangle.
+#[derive(Clone, Debug)]
+struct Placed {
+    x: f64,
+    y: f64,
+    width: f64,
+    height: f64,
+    image: Image,
+}
+
+#[derive(Clone, Debug)]
+enum Image {
+    Raster(Raster),
+    Picture(Picture),
+}
+
+impl Image {
+    /// Returns the pixels; `None` if there are none.
+    fn to_pixmap(&self) -> Option<tiny_skia::Pixmap> {
+        match self {
+            Image::Raster(raster) => raster.to_pixmap(),
+            Image::Picture(picture) => picture.to_pixmap(),
+        }
+    }
+
+    /// Encodes a PNG file; empty if the sizes are inconsistent.
+    fn to_png(&self) -> Vec<u8> {
+        match self {
+            Image::Raster(raster) => raster.to_png(),
+            Image::Picture(picture) => picture.to_png().unwrap_or_default(),
+        }
+    }
 }
 
 /// Formats a value for SVG with at most two decimals.
@@ -57,7 +91,7 @@ pub fn path_data(points: &[(f64, f64)], closed: bool) -> String {
 impl Drawing {
     /// Creates an empty drawing of the given size [pt].
     pub fn new(width: f64, height: f64) -> Drawing {
-        Drawing { width, height, rasters: Vec::new(), vectors: String::new() }
+        Drawing { width, height, images: Vec::new(), vectors: String::new() }
     }
 
     /// Width [pt].
@@ -73,9 +107,8 @@ impl Drawing {
     /// Inserts another drawing with its upper left corner at `(x, y)` [pt]; the prefix `tag` keeps
     /// the identifiers of its clip paths unique.
     pub fn inset(&mut self, other: &Drawing, x: f64, y: f64, tag: &str) {
-        for (left, top, width, height, raster) in &other.rasters {
-            self.raster(x + left, y + top, *width, *height, raster.clone());
-        }
+        let moved = |placed: &Placed| Placed { x: x + placed.x, y: y + placed.y, ..placed.clone() };
+        self.images.extend(other.images.iter().map(moved));
         let vectors = rename_clips(&other.vectors, &format!("clip-{tag}-"));
         self.vectors.push_str(&format!(
             "<g transform=\"translate({} {})\">\n{vectors}</g>\n",
@@ -86,7 +119,12 @@ impl Drawing {
 
     /// Adds a raster that fills the rectangle [pt], below all vectors.
     pub fn raster(&mut self, x: f64, y: f64, width: f64, height: f64, raster: Raster) {
-        self.rasters.push((x, y, width, height, raster));
+        self.images.push(Placed { x, y, width, height, image: Image::Raster(raster) });
+    }
+
+    /// Adds a picture that fills the rectangle [pt], below all vectors.
+    pub fn picture(&mut self, x: f64, y: f64, width: f64, height: f64, picture: Picture) {
+        self.images.push(Placed { x, y, width, height, image: Image::Picture(picture) });
     }
 
     /// Adds a path with SVG attributes `style`.
@@ -212,8 +250,8 @@ impl Drawing {
             text::escape(title),
             text::escape(description)
         );
-        for (x, y, width, height, raster) in &self.rasters {
-            let data = base64::engine::general_purpose::STANDARD.encode(raster.to_png());
+        for Placed { x, y, width, height, image } in &self.images {
+            let data = base64::engine::general_purpose::STANDARD.encode(image.to_png());
             let [x, y, width, height] = [*x, *y, *width, *height].map(number);
             out.push_str(&format!(
                 "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
@@ -247,13 +285,13 @@ impl Drawing {
         let mut pixmap =
             tiny_skia::Pixmap::new(size[0], size[1]).ok_or("the drawing has no pixels")?;
         pixmap.fill(tiny_skia::Color::WHITE);
-        for (x, y, width, height, raster) in &self.rasters {
-            let picture = raster.to_pixmap().ok_or("a raster has no pixels")?;
+        for Placed { x, y, width, height, image } in &self.images {
+            let picture = image.to_pixmap().ok_or("an image has no pixels")?;
             let transform = tiny_skia::Transform::from_row(
-                (scale * width / raster.width as f64) as f32,
+                (scale * width / f64::from(picture.width())) as f32,
                 0.0,
                 0.0,
-                (scale * height / raster.height as f64) as f32,
+                (scale * height / f64::from(picture.height())) as f32,
                 (scale * x) as f32,
                 (scale * y) as f32,
             );
@@ -328,6 +366,22 @@ mod tests {
         };
         assert_eq!(ink(&blank), 0);
         assert!(ink(&png) > 500, "{} dark samples", ink(&png));
+    }
+
+    #[test]
+    fn a_picture_at_its_own_size_keeps_its_pixels() {
+        let pixels = (0..3 * 7 * 5).map(|i| (i * 37 % 256) as u8).collect();
+        let picture = Picture { width: 7, height: 5, pixels };
+        let mut drawing = Drawing::new(11.0, 9.0);
+        drawing.picture(2.0, 3.0, 7.0, 5.0, picture.clone());
+        let drawn = drawing.to_picture([11, 9], 1.0).unwrap();
+        let row = |image: &Picture, x: usize, y: usize| {
+            let start = 3 * (x + image.width * y);
+            image.pixels[start..start + 21].to_vec()
+        };
+        assert!((0..5).all(|y| row(&drawn, 2, 3 + y) == row(&picture, 0, y)));
+        assert_eq!(drawn.pixels[..3 * 11 * 3], [255; 3 * 11 * 3]);
+        assert!(drawing.to_svg("f", "t", "d").contains("data:image/png;base64,iVBOR"));
     }
 
     #[test]

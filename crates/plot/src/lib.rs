@@ -19,6 +19,7 @@ pub mod frame;
 pub mod legend;
 mod palette;
 pub mod raster;
+pub mod scale_bar;
 pub mod stacked;
 pub mod style;
 pub mod text;

@@ -56,6 +56,13 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Converts to the pixels of a drawing; `None` if the sizes are inconsistent.
+    pub(crate) fn to_pixmap(&self) -> Option<tiny_skia::Pixmap> {
+        let size = tiny_skia::IntSize::from_wh(self.width as u32, self.height as u32)?;
+        let data = self.pixels.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect();
+        tiny_skia::Pixmap::from_vec(data, size)
+    }
+
     /// Encodes a PNG file.
     ///
     /// # Errors

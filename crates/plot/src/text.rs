@@ -68,6 +68,19 @@ pub fn literal(text: &str) -> String {
     out
 }
 
+/// Returns a name as a label of at most `most` [pt] at a text size [pt]. A long name lacks its
+/// middle.
+pub fn fitting(name: &str, size: f64, most: f64) -> String {
+    let all: Vec<char> = name.chars().collect();
+    let shortened = |kept: usize| {
+        let head: String = all[..kept.div_ceil(2)].iter().collect();
+        let tail: String = all[all.len() - kept / 2..].iter().collect();
+        if kept == all.len() { literal(name) } else { literal(&format!("{head}…{tail}")) }
+    };
+    let mut labels = (0..=all.len()).rev().map(shortened);
+    labels.find(|label| width(label, size) <= most).unwrap_or_default()
+}
+
 /// Returns the letter of the i-th panel of a figure: "(a)", "(b)" ...
 pub fn letter(i: usize) -> String {
     format!("({})", char::from(b'a' + (i % 26) as u8))
@@ -171,6 +184,15 @@ mod tests {
     fn names_from_files_stay_as_they_are() {
         assert_eq!(plain(&literal("max_{x}^{2} *a* \\")), "max_{x}^{2} *a* \\");
         assert_eq!(escape("<a & 'b'>\u{1}"), "&lt;a &amp; &#39;b&#39;&gt;");
+    }
+
+    #[test]
+    fn long_names_lack_their_middle() {
+        assert_eq!(fitting("g_01", 6.5, 60.0), "g\\_01");
+        let label = fitting("sphere-number-12-of-a-long-name", 6.5, 60.0);
+        assert!(label.starts_with("sphere-") && label.ends_with("-name"), "{label}");
+        assert!(label.contains('…') && width(&label, 6.5) <= 60.0);
+        assert_eq!(fitting("g", 6.5, 0.0), "");
     }
 
     #[test]

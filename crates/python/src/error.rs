@@ -196,10 +196,7 @@ impl IntoException for SetupError {
 
 impl IntoException for StepError {
     fn into_exception(self) -> PyErr {
-        match self {
-            StepError::Unstable { .. } => numerics(self.to_string()),
-            StepError::NotFinite { .. } => input(self.to_string()),
-        }
+        numerics(self.to_string())
     }
 }
 

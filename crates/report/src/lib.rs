@@ -13,6 +13,7 @@ pub mod features;
 pub mod figure;
 mod files;
 mod film;
+pub mod grain_sheet;
 pub mod html;
 mod page;
 pub mod phases;

@@ -313,7 +313,7 @@ impl Recording {
         );
         let (what, remedy) = sim.with_cause(symptom, Remedy::GridOrStepOrSlices);
         let (time, step) = (sim.time(), sim.steps());
-        Err(StepError::Unstable { time, step, what, remedy })
+        Err(StepError { time, step, what, remedy })
     }
 
     /// Returns whether the end of the case is reached.
@@ -333,9 +333,7 @@ impl Recording {
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
     fn failed(&mut self, sim: &Simulation, source: StepError) -> RunError {
-        let StepError::Unstable { time: at, step, what, remedy } = &source else {
-            unreachable!("only a step failed: {source}")
-        };
+        let StepError { time: at, step, what, remedy } = &source;
         let terms = terms(sim);
         let (remedy, time) = (remedy.advice(&terms), self.saved.time);
         let failure = serde_json::json!({

@@ -1,7 +1,7 @@
 //! Rendered images of grains.
 
-use crate::Shape;
 use crate::error::{Result, ShapeError};
+use crate::{Field, Shape};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::io::Write;
@@ -24,23 +24,8 @@ const PAPER: [u8; 3] = [255, 255, 255];
 const STONE: DVec3 = DVec3::new(222.0, 200.0, 165.0);
 /// Colour of a surface node.
 const NODE: [u8; 3] = [150, 30, 30];
-/// Colour of labels.
-const INK: [u8; 3] = [60, 60, 60];
-/// Edge length of a node marker and of a dot of a digit [pixels].
+/// Edge length of a node marker [pixels].
 const DOT: usize = 2;
-/// Bitmaps of the digits, five rows of three dots.
-const DIGITS: [[u8; 5]; 10] = [
-    [7, 5, 5, 5, 7],
-    [2, 6, 2, 2, 7],
-    [7, 1, 7, 4, 7],
-    [7, 1, 7, 1, 7],
-    [5, 5, 7, 1, 1],
-    [7, 4, 7, 1, 7],
-    [7, 4, 7, 5, 7],
-    [7, 1, 1, 1, 1],
-    [7, 5, 7, 5, 7],
-    [7, 5, 7, 1, 7],
-];
 /// Rays along the edge of a pixel.
 const RAYS: usize = 2;
 
@@ -159,20 +144,6 @@ impl Picture {
         sheet
     }
 
-    /// Returns the image with a number in its upper left corner.
-    pub fn numbered(mut self, number: u32) -> Picture {
-        for (place, digit) in number.to_string().bytes().enumerate() {
-            let rows = DIGITS[usize::from(digit - b'0')];
-            let left = DOT * (1 + 4 * place);
-            for (j, row) in rows.into_iter().enumerate() {
-                for i in (0..3).filter(|i| row >> (2 - i) & 1 == 1) {
-                    self.dot(left + DOT * i, DOT * (1 + j), INK);
-                }
-            }
-        }
-        self
-    }
-
     /// Draws a square of `DOT` pixels with this upper left corner.
     fn dot(&mut self, x: usize, y: usize, colour: [u8; 3]) {
         for y in y..(y + DOT).min(self.height) {
@@ -214,7 +185,7 @@ fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> 
         }
         let (distance, gradient) = shape.distance_and_gradient(from + t * along);
         if distance < close {
-            return Some(gradient.normalize_or_zero());
+            return Some(smooth_normal(shape, from + t * along).unwrap_or(gradient));
         }
         // Reduced step: trilinear values may overestimate the distance.
         t += 0.9 * distance;
@@ -222,37 +193,23 @@ fn trace(shape: &Shape, from: DVec3, along: DVec3, reach: f64) -> Option<DVec3> 
     None
 }
 
+/// Returns the normal from differences over the spacing of a sampled field. The gradient of the
+/// trilinear interpolant jumps between cells, which shows as steps.
+fn smooth_normal(shape: &Shape, at: DVec3) -> Option<DVec3> {
+    let Field::Sampled(field) = shape.field() else {
+        return None;
+    };
+    let difference = |axis: DVec3| {
+        let step = 0.5 * field.spacing() * axis;
+        shape.distance(at + step) - shape.distance(at - step)
+    };
+    let [x, y, z] = DVec3::AXES.map(difference);
+    DVec3::new(x, y, z).try_normalize()
+}
+
 /// Diffuse light with a dark rim, so that light faces contrast with the background.
 fn shade(normal: DVec3, light: DVec3, towards_eye: DVec3) -> DVec3 {
     let lit = normal.dot(light).max(0.0);
     let rim = normal.dot(towards_eye).clamp(0.0, 1.0);
     STONE * ((0.25 + 0.75 * lit) * (0.45 + 0.55 * rim.sqrt())).min(1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_stand_in_the_corner() {
-        let picture = Picture::blank(30, 16).numbered(41);
-        let shown: Vec<String> = (0..7)
-            .map(|j| {
-                let row = (0..9).map(|i| picture.pixels[DOT * i + 30 * DOT * j]);
-                row.map(|pixel| if pixel == INK { '#' } else { '.' }).collect()
-            })
-            .collect();
-        let wanted = [
-            ".........",
-            ".#.#..#..",
-            ".#.#.##..",
-            ".###..#..",
-            "...#..#..",
-            "...#.###.",
-            ".........",
-        ];
-        assert_eq!(shown, wanted);
-        // Digits that do not fit are omitted.
-        Picture::blank(5, 5).numbered(12345);
-    }
 }

@@ -7,7 +7,7 @@ use grainwake_solver::grid::{Axis, Mesh};
 use grainwake_solver::math::{Formula, Load};
 use grainwake_solver::shape::Shape;
 use grainwake_solver::sim::{
-    AnyFieldView, ControlError, MotionComponent, PrescribedMotion, Setup, Simulation, StepError,
+    AdvanceError, AnyFieldView, ControlError, MotionComponent, PrescribedMotion, Setup, Simulation,
     StepRule,
 };
 
@@ -160,7 +160,7 @@ fn a_grain_too_light_for_free_motion_is_not_released() {
 fn a_time_that_is_not_finite_is_refused() {
     let mut sim = Simulation::new(setup()).unwrap();
     for time in [f64::NAN, f64::INFINITY] {
-        assert!(matches!(sim.advance_to(time), Err(StepError::NotFinite { .. })));
+        assert!(matches!(sim.advance_to(time), Err(AdvanceError::NotFinite { .. })));
     }
     assert_eq!(sim.steps(), 0);
 }

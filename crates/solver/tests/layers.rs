@@ -25,7 +25,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("solver", &["simd", "formats", "shape"]),
     ("run", &["formats", "shape", "solver"]),
     ("plot", &[]),
-    ("report", &["formats", "plot"]),
+    ("report", &["formats", "plot", "shape"]),
     ("view", &["formats", "plot", "report", "shape"]),
     ("study", &["formats", "plot", "report", "run", "shape", "solver"]),
     ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),

@@ -1,11 +1,13 @@
 //! `grain compare`.
 
 use comfy_table::Table;
-use grainwake_shape::render::Picture;
+use grainwake_report::grain_sheet::{self, GrainPanel};
 use grainwake_shape::{Comparison, Record, Shape};
 use serde_json::json;
 
+use super::drawn;
 use super::may_draw;
+use super::table::{LengthUnit, significant};
 use crate::args::CompareArgs;
 use crate::exit::Exit;
 use crate::out::{markdown, print};
@@ -27,49 +29,81 @@ pub fn compare(args: &CompareArgs) -> Result<(), Exit> {
         print(&serde_json::to_string(&object)?)?;
     } else {
         print(&measures(&one, &other).to_string())?;
-        print(&surfaces(&comparison, first.equivalent_diameter()))?;
+        let unit = unit(&one, &other);
+        print(&surfaces(&comparison, first.equivalent_diameter(), unit))?;
     }
     if let Some(path) = &args.picture {
-        let width = 2.1 * first.bounding_radius().max(second.bounding_radius());
-        let rows = [
-            Picture::sides(&first, glam::DMat3::IDENTITY, 320, width, false),
-            Picture::sides(&second, comparison.turn, 320, width, false),
+        let width = grain_sheet::window(&first).max(grain_sheet::window(&second));
+        let names = drawn::names(&[&args.first, &args.second]);
+        let panels = vec![
+            GrainPanel::sides(&names[0], &first, glam::DMat3::IDENTITY, drawn::SIDE, width, false),
+            GrainPanel::sides(&names[1], &second, comparison.turn, drawn::SIDE, width, false),
         ];
-        Picture::sheet(&rows, 1).save(path)?;
+        drawn::save(path, panels, 1)?;
     }
     Ok(())
 }
 
+/// Significant digits of lengths and areas.
+const DIGITS: i32 = 5;
+
+/// A measure, and its text in the unit of the table.
+struct Measure {
+    value: Option<f64>,
+    text: Option<String>,
+}
+
+/// Returns the unit suited to the larger grain.
+fn unit(first: &Record, second: &Record) -> LengthUnit {
+    LengthUnit::of(first.equivalent_diameter_m.max(second.equivalent_diameter_m))
+}
+
 fn measures(first: &Record, second: &Record) -> Table {
+    let unit = unit(first, second);
+    let size = |x: f64| Some(significant(x, DIGITS));
     let rows = |r: &Record| {
+        let length = |x: f64| Measure { value: Some(x), text: size(unit.per_metre * x) };
+        let ratio = |x: Option<f64>| Measure { value: x, text: x.map(|x| format!("{x:.4}")) };
+        let area = unit.per_metre.powi(2) * r.surface_area_m2;
         [
-            ("equivalent diameter [mm]", Some(1e3 * r.equivalent_diameter_m)),
-            ("a [mm]", Some(1e3 * r.a_m)),
-            ("b [mm]", Some(1e3 * r.b_m)),
-            ("c [mm]", Some(1e3 * r.c_m)),
-            ("elongation b/a", Some(r.elongation)),
-            ("flatness c/b", Some(r.flatness)),
-            ("Krumbein sphericity", Some(r.krumbein_sphericity)),
-            ("Wadell sphericity", Some(r.wadell_sphericity)),
-            ("Wadell roundness", r.wadell_roundness),
-            ("convexity", r.convexity),
-            ("surface area [mm2]", Some(1e6 * r.surface_area_m2)),
+            (format!("equivalent diameter [{}]", unit.name), length(r.equivalent_diameter_m)),
+            (format!("a [{}]", unit.name), length(r.a_m)),
+            (format!("b [{}]", unit.name), length(r.b_m)),
+            (format!("c [{}]", unit.name), length(r.c_m)),
+            ("elongation b/a".to_owned(), ratio(Some(r.elongation))),
+            ("flatness c/b".to_owned(), ratio(Some(r.flatness))),
+            ("Krumbein sphericity".to_owned(), ratio(Some(r.krumbein_sphericity))),
+            ("Wadell sphericity".to_owned(), ratio(Some(r.wadell_sphericity))),
+            ("Wadell roundness".to_owned(), ratio(r.wadell_roundness)),
+            ("convexity".to_owned(), ratio(r.convexity)),
+            (
+                format!("surface area [{}2]", unit.name),
+                Measure { value: Some(area), text: size(area) },
+            ),
         ]
     };
-    let value = |x: Option<f64>| x.map_or("not measured".into(), |x| format!("{x:.4}"));
+    let text = |measure: &Measure| measure.text.clone().unwrap_or("not measured".into());
     let cells = rows(first).into_iter().zip(rows(second)).map(|((name, p), (_, q))| {
-        let difference = p.zip(q).map(|(p, q)| format!("{:+.2} %", 100.0 * (q / p - 1.0)));
-        vec![name.to_owned(), value(p), value(q), difference.unwrap_or("-".into())]
+        let both = p.value.zip(q.value);
+        let difference = both.map(|(p, q)| format!("{:+.2} %", 100.0 * (q / p - 1.0)));
+        vec![name, text(&p), text(&q), difference.unwrap_or("-".into())]
     });
     markdown(["", "first", "second", "difference"], cells, 1..4)
 }
 
-fn surfaces(comparison: &Comparison, diameter: f64) -> String {
+fn surfaces(comparison: &Comparison, diameter: f64, unit: LengthUnit) -> String {
+    // Decimals of 1/100000 of the diameter: smaller distances are round-off.
+    let size = unit.per_metre * diameter;
+    let decimals = (5 - size.log10().floor() as i32).clamp(0, 9);
+    let step = 10f64.powi(-decimals);
     let line = |name: &str, x: f64| {
+        // The sum turns -0 into 0.
+        let rounded = (unit.per_metre * x / step).round() * step + 0.0;
         format!(
-            "{name:31} {:>10.5} mm  {:>8.3} % of the first diameter",
-            1e3 * x,
-            100.0 * x / diameter
+            "{name:31} {:>10} {}  {:>8.3} % of the first diameter",
+            format!("{rounded:.*}", decimals as usize),
+            unit.name,
+            100.0 * rounded / size
         )
     };
     [

@@ -1,10 +1,10 @@
 //! `grain family`.
 
+use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
-use grainwake_shape::render::Picture;
 use grainwake_shape::{ShapeError, write_table};
 
-use super::{create, folder, length, may_write, show};
+use super::{create, drawn, folder, length, may_write, show};
 use crate::args::FamilyArgs;
 use crate::exit::Exit;
 
@@ -43,13 +43,12 @@ pub fn family(args: &FamilyArgs) -> Result<(), Exit> {
         let path = file(n + 1);
         shape.save(&path)?;
         show(shape, &path, args.common.json)?;
-        rows.push((format!("{:02}", n + 1), shape.record()));
-        let number = n as u32 + 1;
-        pictures.push(Picture::three_sides(shape, PIXELS, false).numbered(number));
+        let name = format!("{:02}", n + 1);
+        pictures.push(GrainPanel::three_sides(&name, shape, PIXELS, false));
+        rows.push((name, shape.record()));
     }
     write_table(&table, &rows, &[])?;
-    Picture::sheet(&pictures, args.roundness.len()).save(&sheet)?;
-    Ok(())
+    drawn::save(&sheet, pictures, args.roundness.len())
 }
 
 /// Adds the admissible range to an error about the flatness.

@@ -1,6 +1,7 @@
 //! `grainwake grain`: creates, inspects and compares `.grain` files.
 
 mod compare;
+mod drawn;
 mod export;
 mod family;
 mod make;
@@ -13,10 +14,10 @@ mod table;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_run::case::parse_length;
 use grainwake_run::check_grain_size;
-use grainwake_shape::render::Picture;
-use grainwake_shape::{Shape, ShapeOptions};
+use grainwake_shape::{Shape, ShapeOptions, check_length};
 
 use crate::args::{GrainCommand, InfoArgs, NewGrain};
 use crate::exit::{Exit, IO};
@@ -65,9 +66,14 @@ fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
     check_grain_size(shape).map_err(|message| Exit::refused(message, help))
 }
 
-/// Parses `--equivalent-diameter` [m].
+/// Parses `--equivalent-diameter` [m], before the work starts.
 fn diameter(new: &NewGrain) -> Result<Option<f64>, Exit> {
-    new.equivalent_diameter.as_ref().map(|text| length("--equivalent-diameter", text)).transpose()
+    let Some(text) = &new.equivalent_diameter else {
+        return Ok(None);
+    };
+    let diameter = length("--equivalent-diameter", text)?;
+    check_length("--equivalent-diameter", diameter)?;
+    Ok(Some(diameter))
 }
 
 fn options(new: &NewGrain) -> ShapeOptions {
@@ -197,15 +203,15 @@ fn info(args: &InfoArgs) -> Result<(), Exit> {
         may_draw("--picture", picture, &inputs)?;
     }
     let mut pictures = Vec::new();
-    for path in &args.files {
+    for (path, name) in args.files.iter().zip(drawn::names(&args.files)) {
         let shape = Shape::load(path)?;
         show(&shape, path, args.json)?;
         if args.picture.is_some() {
-            pictures.push(Picture::three_sides(&shape, 320, true));
+            pictures.push(GrainPanel::three_sides(&name, &shape, drawn::SIDE, true));
         }
     }
     if let Some(path) = &args.picture {
-        Picture::sheet(&pictures, 1).save(path)?;
+        drawn::save(path, pictures, 1)?;
     }
     Ok(())
 }

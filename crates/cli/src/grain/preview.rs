@@ -6,6 +6,7 @@ use std::path::Path;
 
 use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::raster::Raster;
+use grainwake_plot::scale_bar::ScaleBar;
 use grainwake_plot::style::{PAGE, PIXELS_PER_POINT, SMALL, TEXT};
 use grainwake_plot::{literal, text};
 use grainwake_shape::scan::{Scan, Volume, Voxels};
@@ -30,6 +31,10 @@ const GAP: f64 = 10.0;
 const TALLEST: f64 = 230.0;
 /// Height of a line of text [pt].
 const LINE: f64 = 10.5;
+/// Height of the line of the scale bar below a panel [pt].
+const BAR: f64 = 12.0;
+/// Largest length of a scale bar relative to the width of its panel.
+const LONGEST: f64 = 0.5;
 /// Period of the hatch [pixels]; half of it shows the image.
 const HATCH: usize = 14;
 /// Minimum size of a region with a number [pt].
@@ -46,6 +51,8 @@ struct Slice {
 /// The image with the results of the scan.
 struct Image<'a> {
     dims: [usize; 3],
+    /// Edge of a voxel [m].
+    voxel: f64,
     labels: &'a [u32],
     /// Index of the colour of a label, and whether it is hatched as rejected.
     colours: HashMap<u32, (usize, bool)>,
@@ -53,8 +60,15 @@ struct Image<'a> {
     grey: Box<dyn Fn(usize) -> f64 + 'a>,
 }
 
-/// Draws three slices along z, one along y and one along x, with a legend.
-pub fn draw(picture: &Path, args: &FromScanArgs, volume: &Volume, scan: &Scan) -> Result<(), Exit> {
+/// Draws three slices along z, one along y and one along x, with a legend, of voxels of this edge
+/// [m].
+pub fn draw(
+    picture: &Path,
+    args: &FromScanArgs,
+    voxel: f64,
+    volume: &Volume,
+    scan: &Scan,
+) -> Result<(), Exit> {
     let Voxels::Labels(labels) = &scan.labels.voxels else {
         return Err(Exit::input("the image has no labels"));
     };
@@ -65,7 +79,8 @@ pub fn draw(picture: &Path, args: &FromScanArgs, volume: &Volume, scan: &Scan) -
     });
     let dims = volume.dims;
     let colours = kept.chain(rejected).collect();
-    let image = Image { dims, labels, colours, grey: greys(volume, args.threshold.is_some()) };
+    let grey = greys(volume, args.threshold.is_some());
+    let image = Image { dims, voxel, labels, colours, grey };
     let panels = [(2, 1, 4), (2, 2, 4), (2, 3, 4), (1, 1, 2), (0, 1, 2)].map(|(normal, n, of)| {
         let [right, down] = [[1, 2], [0, 2], [0, 1]][normal];
         Slice { right, down, normal, at: dims[normal] * n / of }
@@ -211,7 +226,7 @@ fn page(image: &Image, panels: &[Slice], legend: &[Row]) -> Drawing {
     };
     let rows: Vec<&[Slice]> = panels.chunks(3).collect();
     let tall = |row: &[Slice]| row.iter().map(|s| size(s)[1]).fold(0.0, f64::max);
-    let body: f64 = rows.iter().map(|row| tall(row) + LINE + GAP).sum();
+    let body: f64 = rows.iter().map(|row| tall(row) + LINE + BAR + GAP).sum();
     let mut drawing = Drawing::new(PAGE, body + LINE * legend.len() as f64 + GAP);
     let mut top = 0.0;
     for row in rows {
@@ -219,7 +234,7 @@ fn page(image: &Image, panels: &[Slice], legend: &[Row]) -> Drawing {
             let left = n as f64 * (widest + GAP);
             panel(&mut drawing, image, slice, [left, top + LINE], size(slice));
         }
-        top += tall(row) + LINE + GAP;
+        top += tall(row) + LINE + BAR + GAP;
     }
     for (n, row) in legend.iter().enumerate() {
         entry(&mut drawing, row, top + LINE * (n as f64 + 0.5), n == 0);
@@ -227,7 +242,7 @@ fn page(image: &Image, panels: &[Slice], legend: &[Row]) -> Drawing {
     drawing
 }
 
-/// Draws a slice with its position and the numbers of its larger labels.
+/// Draws a slice with its position, the numbers of its larger labels and a scale bar.
 fn panel(
     drawing: &mut Drawing,
     image: &Image,
@@ -243,6 +258,10 @@ fn panel(
     drawing.raster(left, top, width, height, image.raster(slice, across, along));
     drawing.outline(left, top, width, height);
     let scale = width / image.dims[slice.right] as f64;
+    let bar = ScaleBar::within(LONGEST * width / scale * image.voxel);
+    // The ends of the bar are within the panel.
+    let place = (left + 0.5, top + height + 0.5 * BAR + 1.0);
+    bar.draw(drawing, place, scale / image.voxel, SMALL);
     for (label, [x, y], extent) in image.regions(slice) {
         if extent as f64 * scale > NUMBERED {
             let at = (left + scale * x, top + scale * y + 0.36 * SMALL);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use grainwake_shape::render::{Picture, View};
+use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_shape::scan::{
     Scan, ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
 };
@@ -14,8 +14,8 @@ use serde_json::json;
 use super::preview;
 use super::refused::{advice, lines, named};
 use super::{
-    create, diameter, folder, length, may_draw, may_write, not_input, options, plausible, save,
-    sized,
+    create, diameter, drawn, folder, length, may_draw, may_write, not_input, options, plausible,
+    save, sized, table,
 };
 use crate::args::FromScanArgs;
 use crate::exit::{BAD_INPUT, Exit};
@@ -79,7 +79,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     }
     grey_notes(&scan.grains).iter().for_each(|note| tell!("note: {note}"));
     if let Some(picture) = &args.preview {
-        preview::draw(picture, args, &volume, &scan)?;
+        preview::draw(picture, args, how.voxel, &volume, &scan)?;
         let lines = treated(&scan.grains).into_iter().chain(lines(&scan.refusals, args.rescue));
         lines.for_each(|line| tell!("{line}"));
         let kept = scan.grains.iter().filter(|g| g.shape.is_ok()).count();
@@ -109,6 +109,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
             ));
         }
     };
+    treated(std::slice::from_ref(&grain)).iter().for_each(|line| tell!("{line}"));
     save(&sized(grain.shape?, diameter, "--voxel")?, &args.new)
 }
 
@@ -145,7 +146,11 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
 /// Fraction of the surface cut from neighbours above which the roundness is doubtful.
 const MUCH_SHARED: f64 = 0.01;
 
-/// Describes what was changed on grains: specks removed, and labels rescued, by cure.
+/// Smallest share of filled cavities in the volume of a grain that is told.
+const CAVITIES_TOLD: f64 = 1e-3;
+
+/// Describes what was changed on grains: specks removed, cavities filled, and labels rescued, by
+/// cure.
 fn treated(grains: &[ScannedGrain]) -> Vec<String> {
     let mut lines = Vec::new();
     let cleaned: Vec<&ScannedGrain> = grains.iter().filter(|g| g.specks_removed() > 0.0).collect();
@@ -156,6 +161,18 @@ fn treated(grains: &[ScannedGrain]) -> Vec<String> {
             "specks removed from {}, at most {:.2} % of the volume: {}",
             count(labels.len(), "grain"),
             100.0 * most.max(5e-5),
+            named(&labels)
+        ));
+    }
+    let hollow = grains.iter().filter(|g| g.cavities_filled() >= CAVITIES_TOLD);
+    let hollow: Vec<&ScannedGrain> = hollow.collect();
+    let most = hollow.iter().map(|g| g.cavities_filled()).fold(0.0, f64::max);
+    let labels: Vec<u32> = hollow.iter().map(|g| g.label).collect();
+    if !labels.is_empty() {
+        lines.push(format!(
+            "cavities filled in {}, at most {:.2} % of the volume: {}",
+            count(labels.len(), "grain"),
+            100.0 * most,
             named(&labels)
         ));
     }
@@ -195,8 +212,9 @@ fn tables(place: &Path) -> [PathBuf; 3] {
 fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exit> {
     let Scan { mut grains, labels, refusals, .. } = scan;
     let place = &args.new.output;
-    let path = |label: u32| -> PathBuf { place.join(format!("label-{label:05}.grain")) };
-    let [table, sheet, image] = tables(place);
+    let name = |label: u32| format!("label-{label:05}");
+    let path = |label: u32| place.join(name(label) + ".grain");
+    let [table_file, sheet, image] = tables(place);
     let earlier = earlier(place);
     if let Some(diameter) = diameter {
         for grain in &mut grains {
@@ -212,7 +230,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     if let Some((_, shape)) = largest.filter(|_| diameter.is_none()) {
         plausible(shape, "--voxel")?;
     }
-    for file in [&table, &sheet, &image] {
+    for file in [&table_file, &sheet, &image] {
         not_input(file, &args.image)?;
     }
     // Grains of an earlier command are not part of the new table and label image.
@@ -225,7 +243,7 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     let advice = advice(&grains);
     let treated = treated(&grains);
     let rejected = grains.iter().filter(|g| g.shape.is_err()).count();
-    let drawn: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
+    let pictured: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
     let outcomes: Vec<_> = grains
         .into_par_iter()
         .filter_map(|grain| {
@@ -234,10 +252,10 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
             let written = shape.ok().map(|shape| {
                 let file = path(label);
                 shape.save(&file)?;
-                let picture = drawn.binary_search(&label).is_ok().then(|| {
-                    let width = 2.1 * shape.bounding_radius();
-                    Picture::of(&shape, View::BROAD, SHEET.0, width, false)
-                });
+                let picture = pictured
+                    .binary_search(&label)
+                    .is_ok()
+                    .then(|| GrainPanel::broad(&name(label), &shape, SHEET.0));
                 Ok::<_, Exit>((file, shape.record(), picture))
             })?;
             Some((label, voxels, shared_surface, specks, rescued, written))
@@ -247,20 +265,21 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
     let (mut shared, mut removed) = (Vec::new(), Vec::new());
     for (label, voxels, shared_surface, specks, rescued, written) in outcomes {
         let (file, record, picture) = written?;
-        pictures.extend(picture.map(|picture| picture.numbered(label)));
+        pictures.extend(picture);
         if args.new.common.json {
             let rescued = rescued.map(|cure| cure.to_string());
             print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "specks_removed": specks, "rescued": rescued, "file": file, "record": record }).to_string())?;
         } else {
             print(&format!(
-                "{}  {} voxels, equivalent diameter {:.4} mm, Krumbein sphericity {:.3}",
+                "{}  {} voxels, equivalent diameter {}, Krumbein sphericity {:.3}",
                 file.display(),
                 voxels,
-                1e3 * record.equivalent_diameter_m,
+                table::LengthUnit::of(record.equivalent_diameter_m)
+                    .text(record.equivalent_diameter_m, 4),
                 record.krumbein_sphericity
             ))?;
         }
-        rows.push((format!("label-{label:05}"), record));
+        rows.push((name(label), record));
         shared.push(shared_surface);
         removed.push(specks);
     }
@@ -280,11 +299,11 @@ fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exi
             "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}); their roundness is measured away from the cuts, and missing where too little surface remains",
             rows.len(),
             100.0 * MUCH_SHARED,
-            table.display()
+            table_file.display()
         );
     }
-    write_table(&table, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
-    Picture::sheet(&pictures, SHEET.1).save(&sheet)?;
+    write_table(&table_file, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
+    drawn::save(&sheet, pictures, SHEET.1)?;
     labels.save_labels(&image)?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Output of the commands.
 
 use crate::common::{DRY, WET, folder_with, grainwake};
+use grainwake_plot::raster::Picture;
 use grainwake_solver::math::InstructionSet;
 use predicates::str::contains;
 use serde_json::Value;
@@ -482,7 +483,9 @@ fn grains_are_compared() {
     let text = compare(&["--picture", picture.to_str().unwrap()]);
     let text = String::from_utf8_lossy(&text);
     assert!(text.contains("Krumbein sphericity") && text.contains("root mean square"), "{text}");
-    assert!(picture.exists());
+    // Two grains of 320 pixels per view, with margins and lines of text.
+    let drawn = Picture::from_png(&std::fs::read(&picture).unwrap()).unwrap();
+    assert_eq!((drawn.width, drawn.height), (974, 765));
     let mut over = grainwake();
     over.args(["grain", "compare"])
         .args([path("long.grain"), path("flat.grain")])

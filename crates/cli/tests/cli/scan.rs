@@ -156,3 +156,31 @@ fn the_voxel_size_of_the_file_is_compared() {
     let message = run("20 20 50", "20 um", 2);
     assert!(message.contains("20 x 20 x 50 um") && message.contains("resample"), "{message}");
 }
+
+#[test]
+fn filled_cavities_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    // A ball of radius 20 voxels with a closed cavity of radius 8.
+    let value = |n: usize| {
+        let x = [n % N, n / N % N, n / N / N].map(|i| i as f64 + 0.5 - 32.0);
+        let radius = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        u8::from((8.0..20.0).contains(&radius))
+    };
+    let values: Vec<u8> = (0..N * N * N).map(value).collect();
+    for more in [&["--force"][..], &["--force", "--separate"], &["--force", "--preview", "x.png"]] {
+        let message = from_scan(folder.path(), &values, more, 0);
+        let words = "cavities filled in 1 grain, at most 6.4";
+        assert!(message.contains(words), "{more:?}: {message}");
+    }
+}
+
+#[test]
+fn a_diameter_out_of_range_is_refused_before_the_image_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for diameter in ["0 mm", "-2 mm", "1e9 m"] {
+        let more = ["--threshold", "otsu", "--equivalent-diameter", diameter];
+        let message = from_scan(folder.path(), &masked(), &more, 2);
+        assert!(message.contains("--equivalent-diameter = "), "{message}");
+        assert!(!message.contains("threshold 1"), "the image was read first: {message}");
+    }
+}

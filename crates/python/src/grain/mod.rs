@@ -7,8 +7,8 @@ mod volume;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use grainwake_report::grain_sheet::{GrainPanel, sheet};
 use grainwake_run::case::quantity::{Density, Length};
-use grainwake_shape::render::Picture;
 use grainwake_shape::{Record, Shape};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -46,11 +46,11 @@ impl PyGrain {
 
     /// Returns views from three sides as PNG.
     fn drawn<'py>(&self, py: Python<'py>, pixels: usize) -> PyResult<Bound<'py, PyBytes>> {
-        let mut bytes = Vec::new();
-        let drawn =
-            py.detach(|| Picture::three_sides(&self.shape, pixels, false).encode(&mut bytes));
-        drawn.map_err(|error| crate::error::system(error.kind(), error.to_string()))?;
-        Ok(PyBytes::new(py, &bytes))
+        let drawn = py.detach(|| {
+            let panel = GrainPanel::three_sides("", &self.shape, pixels, false);
+            sheet(vec![panel], 1)?.to_png()
+        });
+        Ok(PyBytes::new(py, &drawn.map_err(input)?))
     }
 }
 
@@ -227,7 +227,7 @@ impl PyGrain {
         slf.py().import("grainwake._mesh")?.call_method1("grain_mesh", (slf, kind))
     }
 
-    /// Rendered views from three sides as PNG.
+    /// Rendered views from three sides as PNG, with a scale bar.
     ///
     /// Parameters
     /// ----------

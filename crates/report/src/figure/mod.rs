@@ -1,5 +1,6 @@
 //! Figures of a run.
 
+mod arrows;
 mod curves;
 pub mod field;
 pub mod grain_surface;

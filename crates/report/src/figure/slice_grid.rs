@@ -2,23 +2,24 @@
 
 use grainwake_plot::axis::{Axis, AxisRange};
 use grainwake_plot::colormap::ColorMap;
-use grainwake_plot::drawing::{Anchor, Drawing, path_data};
+use grainwake_plot::drawing::{Anchor, Drawing};
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
-use grainwake_plot::style::{FAINT, HAIR, INK, PAGE, SMALL};
+use grainwake_plot::style::{FAINT, INK, PAGE, SMALL};
 use grainwake_plot::text;
 
 use serde::Deserialize;
 
+use super::arrows::{self, ArrowKey};
 use super::grain_surface::Outline;
 use super::scene::AXES;
 use super::section::{Section, Shading};
 
 /// Pixels of a slice per point of the page.
 const PIXELS: f64 = 3.0;
-/// Distance of the arrows [pt].
-const ARROWS: f64 = 8.5;
 /// Distance between rows [pt].
 const ROW_GAP: f64 = 12.0;
+/// Space between the colour bar and the key of the arrows [pt].
+const KEY_GAP: f64 = 20.0;
 
 /// Quantity shown in slices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -102,6 +103,8 @@ pub struct ColourScale {
     pub axis: Axis,
     /// Largest magnitude in the windows, outside the grains.
     pub largest: f64,
+    /// Unit of the values, in label markup; empty if the label states none.
+    unit: String,
     arrows: bool,
 }
 
@@ -138,11 +141,19 @@ impl ColourScale {
                 (ColorMap::Magnitude, axis, 1.0)
             }
         };
+        // A label of the user's, such as "|u|/U", may have no unit in brackets.
+        let unit = match &style.label {
+            None => "m/s",
+            Some(label) => {
+                label.split_once('[').and_then(|l| Some(l.1.split_once(']')?.0)).unwrap_or("")
+            }
+        };
         ColourScale {
             quantity,
             map,
             axis,
             largest,
+            unit: unit.trim_matches('–').to_owned(),
             arrows: style.arrows && quantity == Quantity::Speed && largest > 0.0,
         }
     }
@@ -228,10 +239,15 @@ pub fn draw(
         let middle = (9.0, row_top(r) + 0.5 * height);
         drawing.upward_label(middle, Anchor::Middle, SMALL, colour, name);
     }
-    let length = 180.0_f64.min(total - 40.0);
-    let corner = (0.5 * (total - length), bottom + 28.0);
+    let key = scale.arrows.then(|| ArrowKey::new(scale.largest, &scale.unit));
+    let beside = key.as_ref().map_or(0.0, |key| KEY_GAP + key.width());
+    let length = 180.0_f64.min(total - 40.0 - beside);
+    let corner = (0.5 * (total - length - beside), bottom + 28.0);
     let palette = scale.map.palette();
     colour_bar(&mut drawing, corner, length, &palette, &scale.axis, scale.beyond());
+    if let Some(key) = key {
+        key.draw(&mut drawing, (corner.0 + length + KEY_GAP, corner.1 + 3.0));
+    }
     Some(drawing)
 }
 
@@ -259,7 +275,7 @@ fn draw_section(
     drawing.raster(frame.corner.0, frame.corner.1, width, height, raster);
     frame.clip(drawing, clip);
     if let Some(velocity) = section.velocity.as_ref().filter(|_| scale.arrows) {
-        draw_arrows(drawing, section, velocity, frame, scale.largest);
+        arrows::draw(drawing, section, velocity, frame, scale.largest);
     }
     for (colour, ring) in outlines {
         let style = format!(
@@ -268,50 +284,6 @@ fn draw_section(
         drawing.path(&frame.path(ring, true), &style);
     }
     drawing.end_clip();
-}
-
-/// Draws arrows of the velocity in the plane, their length relative to the largest speed.
-fn draw_arrows(
-    drawing: &mut Drawing,
-    section: &Section,
-    velocity: &[[f64; 3]],
-    frame: &EqualAspectFrame,
-    largest: f64,
-) {
-    let (width, height) = (frame.width(), frame.height());
-    let (columns, rows) = ((width / ARROWS) as usize, (height / ARROWS) as usize);
-    let mut data = String::new();
-    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-        let x = frame.corner.0 + width * (column as f64 + 0.5) / columns as f64;
-        let y = frame.corner.1 + height * (row as f64 + 0.5) / rows as f64;
-        let at = frame.point((x, y));
-        if section.sample(|cell| section.solid(cell), at) > 0.1 {
-            continue;
-        }
-        let [u, w] = [0, 1].map(|i| section.sample(|cell| velocity[cell][i], at) / largest);
-        let size = u.hypot(w);
-        if size.is_nan() || size < 0.06 {
-            continue;
-        }
-        let length = 1.7 * ARROWS * size.min(1.0);
-        let w = if frame.flipped { -w } else { w };
-        let (dx, dy) = (u / size, -w / size);
-        let end = |part: f64| (x + part * length * dx, y + part * length * dy);
-        let (tail, tip) = (end(-0.5), end(0.5));
-        let head = 0.35 * length.min(5.0);
-        let barb = |side: f64| {
-            (tip.0 - head * (dx - 0.5 * side * dy), tip.1 - head * (dy + 0.5 * side * dx))
-        };
-        data += &path_data(&[tail, tip], false);
-        data += &path_data(&[barb(1.0), tip, barb(-1.0)], false);
-    }
-    if !data.is_empty() {
-        let width = HAIR - 0.1;
-        let style = format!(
-            "fill=\"none\" stroke=\"{INK}\" stroke-opacity=\"0.75\" stroke-width=\"{width}\""
-        );
-        drawing.path(&data, &style);
-    }
 }
 
 /// Returns the finite values of all cells in the windows, outside the grains.

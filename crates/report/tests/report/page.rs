@@ -104,7 +104,10 @@ fn a_pair_gets_all_its_figures() {
         ),
         ("velocity", vec!["vz / √(d g)  [–]", "grain 1 (leading at the start)"]),
         ("orientation", vec!["long axis  [°]", "short axis  [°]", "|ω| √(d/g)  [–]"]),
-        ("speed", vec!["speed |u|  [m/s]", "plane of grain 0", "(b) kiss", "t √(g/d) = 17.9"]),
+        (
+            "speed",
+            vec!["speed |u|  [m/s]", "0.1 m/s", "plane of grain 0", "(b) kiss", "t √(g/d) = 17.9"],
+        ),
         ("vorticity", vec!["vorticity ωy  [1/s]", "(c) role change"]),
         ("diagnostics", vec!["max |div u|  [1/s]", "CFL  [–]", "energy  [10−9 J]"]),
     ] {

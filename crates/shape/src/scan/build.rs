@@ -35,6 +35,20 @@ impl ScannedGrain {
         let removed = parameters.filter(|(name, _)| name.ends_with(specks::REMOVED));
         removed.filter_map(|(_, value)| value.parse::<f64>().ok()).fold(0.0, |sum, part| sum + part)
     }
+
+    /// Returns the fraction of the volume of the grain that was a closed cavity.
+    pub fn cavities_filled(&self) -> f64 {
+        let Ok(shape) = &self.shape else {
+            return 0.0;
+        };
+        let provenance = shape.provenance();
+        let number = |name: &str| {
+            let found = provenance.parameters.iter().find(|(key, _)| key == name);
+            found.and_then(|(_, value)| value.parse::<f64>().ok()).unwrap_or(0.0)
+        };
+        let [solid, filled] = [grain::VOXELS, grain::CAVITIES].map(number);
+        filled / (solid + filled).max(1.0)
+    }
 }
 
 /// Result for a volume.

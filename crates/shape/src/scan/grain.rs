@@ -18,6 +18,9 @@ use crate::surface::{Samples, extract};
 use crate::{Shape, specks};
 use glam::DVec3;
 
+/// Parameters of the provenance with the number of solid voxels and of those of filled cavities.
+pub(super) const VOXELS: &str = "voxels";
+pub(super) const CAVITIES: &str = "cavity_voxels_filled";
 /// Minimum number of voxels of a grain: a ball of diameter 5 voxels.
 const FEWEST: u64 = 64;
 /// Number of cells across a grain below which the smoothed field is refined before surface
@@ -70,13 +73,14 @@ pub(super) fn shape(context: &Context, label: u32, region: &Region, cure: Cure) 
     }
     let solid = Mask { dims: mask.dims, solid: mask.solid.clone() };
     let filled = fill_cavities(mask.dims, &mut mask.solid);
+    let earlier = segments.filled.get(&label).copied().unwrap_or(0);
     let longest = (0..3).map(|a| region.upper[a] - region.lower[a] + 1).max().unwrap_or(1);
     let factor = FINE[usize::from(segments.grey.is_none())].div_ceil(longest).clamp(1, 4);
     let mut provenance = Provenance::new("scan")
         .with("voxel_m", options.voxel)
         .with("label", label)
-        .with("voxels", voxels)
-        .with("cavity_voxels_filled", filled)
+        .with(VOXELS, voxels.saturating_sub(earlier))
+        .with(CAVITIES, filled + earlier)
         .with("smoothing_voxels", smoothing)
         .with("split", options.split)
         .with("pad", options.pad);

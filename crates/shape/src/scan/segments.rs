@@ -3,13 +3,14 @@
 use super::field_of_view::FieldOfView;
 use super::grey::{Grey, LAYERS};
 use super::threshold::median;
-use super::volume::{Volume, Voxels};
+use super::volume::{LARGEST_LABEL, Volume, Voxels, is_label};
 use super::watershed::{HALO, add_halo, separate};
 use super::{Mask, Progress, ScanOptions, looks_grey, transform};
 use crate::error::{Result, ShapeError};
+use crate::grid::place;
 use crate::limits::SourceFile;
 use crate::runs::{fill_cavities, pieces};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Result of the segmentation.
 pub(super) struct Segments {
@@ -20,6 +21,8 @@ pub(super) struct Segments {
     /// Labels at the edge of the field of view.
     pub cut_by_view: BTreeSet<u32>,
     pub masked: Option<Masked>,
+    /// Voxels of each label that were cavities before the grains were separated.
+    pub filled: BTreeMap<u32, u64>,
 }
 
 /// Exterior of the field of view of an image.
@@ -57,17 +60,27 @@ pub(super) fn segment(
                     divide(&phase, dims, options, progress)?
                 }
             };
+            let (divided, filled) = divided;
             return Ok(Segments {
                 labels: divided,
                 grey: None,
                 threshold: None,
                 cut_by_view: BTreeSet::new(),
                 masked: None,
+                filled,
             });
         }
-        (Voxels::Grey(_), None) => {
-            let reason = "the image has grey values, not labels; give a threshold (--threshold \
-                          otsu, otsu3, or a grey value)";
+        (Voxels::Grey(values), None) => {
+            let first = values.iter().position(|v| !is_label(*v));
+            let found = first.map_or(String::new(), |n| {
+                let [i, j, k] = place(dims, n);
+                format!(", such as {} at voxel x {i}, y {j}, z {k}", values[n])
+            });
+            let reason = format!(
+                "the image has grey values{found}; labels are whole numbers from 0 to \
+                 {LARGEST_LABEL}; give a threshold for grey values (--threshold otsu, otsu3, or a \
+                 grey value)"
+            );
             return Err(ShapeError::unsupported(source.name.as_ref(), reason));
         }
         (Voxels::Labels(v), _) => v.iter().map(|v| *v as f32).collect(),
@@ -87,13 +100,14 @@ pub(super) fn segment(
     if let Some(view) = &view {
         view.clear_outside(&mut binary);
     }
-    let labels = divide(&binary, dims, options, progress)?;
+    let (labels, filled) = divide(&binary, dims, options, progress)?;
     let mut segments = Segments {
         cut_by_view: view.as_ref().map_or_else(BTreeSet::new, |view| view.cuts(&labels)),
         labels,
         grey: None,
         threshold: Some(cut),
         masked: view.map(|view| Masked { value: view.outside, share: view.share }),
+        filled,
     };
     if options.sub_voxel && !is_mask(&values, outside) && segments.labels.iter().all(|l| *l < HALO)
     {
@@ -113,15 +127,18 @@ fn is_mask(values: &[f32], outside: Option<f32>) -> bool {
     inside.all(|v| Some(v) == first || Some(v) == second)
 }
 
-/// Fills cavities, splits and separates according to the options.
+/// Fills cavities, splits and separates according to the options. Returns the labels and, for each,
+/// the number of filled voxels.
 fn divide(
     labels: &[u32],
     dims: [usize; 3],
     options: &ScanOptions,
     progress: Progress,
-) -> Result<Vec<u32>> {
+) -> Result<(Vec<u32>, BTreeMap<u32, u64>)> {
+    let mut filled = BTreeMap::new();
     let Some(neck) = options.separate else {
-        return Ok(if options.split { pieces(dims, |n| labels[n]).0 } else { labels.to_vec() });
+        let divided = if options.split { pieces(dims, |n| labels[n]).0 } else { labels.to_vec() };
+        return Ok((divided, filled));
     };
     progress("separate", 0, 1);
     let mut mask = Mask { dims, solid: labels.iter().map(|l| *l != 0).collect() };
@@ -129,5 +146,10 @@ fn divide(
         return Err(ShapeError::SolidVolume);
     }
     fill_cavities(dims, &mut mask.solid);
-    Ok(separate(&transform::to_void(&mask), dims, neck))
+    let divided = separate(&transform::to_void(&mask), dims, neck);
+    for (_, label) in labels.iter().zip(&divided).filter(|(before, own)| **before == 0 && **own > 0)
+    {
+        *filled.entry(*label).or_default() += 1;
+    }
+    Ok((divided, filled))
 }

@@ -40,6 +40,15 @@ impl Voxels {
     }
 }
 
+/// Largest label of an image with other values than unsigned integers. Single precision does not
+/// represent all larger integers, so that labels could merge.
+pub(super) const LARGEST_LABEL: u32 = 1 << 24;
+
+/// Returns whether a value may be a label.
+pub(super) fn is_label(value: f32) -> bool {
+    (0.0..=LARGEST_LABEL as f32).contains(&value) && value.fract() == 0.0
+}
+
 /// A 3-D image, x fastest, then y, then z.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
@@ -75,9 +84,7 @@ impl Volume {
             );
             return Err(ShapeError::unsupported(path, reason));
         }
-        // Single precision does not represent all larger integers, so that labels could merge.
-        let whole = |v: &f32| *v >= 0.0 && *v <= 16_777_216.0 && v.fract() == 0.0;
-        let voxels = if values.iter().all(whole) {
+        let voxels = if values.iter().all(|v| is_label(*v)) {
             Voxels::Labels(values.iter().map(|v| *v as u32).collect())
         } else {
             Voxels::Grey(values)

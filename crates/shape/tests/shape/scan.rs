@@ -142,6 +142,30 @@ fn cavities_are_filled_and_counted() {
     close(shape.volume(), 4.0 / 3.0 * PI * (10.0 * VOXEL).powi(3), 0.005);
     let filled = ("cavity_voxels_filled".to_owned(), "2".to_owned());
     assert!(shape.provenance().parameters.contains(&filled));
+    // Separation fills the cavities of the whole image before.
+    let apart = ScanOptions { separate: Some(0.8), ..options() };
+    let (volume, source) = (&volume, &SourceFile::default());
+    for options in [options(), apart] {
+        let grain = shapes_from_volume(volume, source, &options).unwrap().remove(0);
+        let all = grain.voxels as f64 + if options.separate.is_some() { 0.0 } else { 2.0 };
+        close(grain.cavities_filled(), 2.0 / all, 1e-9);
+        assert!(grain.shape.unwrap().provenance().parameters.contains(&filled));
+    }
+}
+
+#[test]
+fn grey_values_without_a_threshold_are_refused_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("signed.nrrd");
+    let header = "NRRD0004\ntype: int8\ndimension: 3\nsizes: 2 3 4\nencoding: raw\n\n";
+    let mut values = [1i8; 24];
+    values[9] = -7;
+    std::fs::write(&path, [header.as_bytes(), &values.map(|v| v as u8)].concat()).unwrap();
+    let (volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
+    let error = shapes_from_volume(&volume, &source, &options()).unwrap_err().to_string();
+    for words in ["-7 at voxel x 1, y 1, z 1", "whole numbers from 0 to 16777216"] {
+        assert!(error.contains(words), "{words} is missing in {error}");
+    }
 }
 
 #[test]

@@ -91,39 +91,40 @@ impl fmt::Display for Remedy {
     }
 }
 
-/// Failure of a step.
+/// Failure of a step: the state is not finite, the CFL number is too large, grains overlap too far,
+/// or a grain of a run with a refined box reaches a free surface.
 #[derive(Debug, thiserror::Error)]
-pub enum StepError {
-    /// A simulation cannot be advanced to this time; its state has not changed.
+#[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
+pub struct StepError {
+    /// Time [s].
+    pub time: f64,
+    /// Number of the step.
+    pub step: u64,
+    /// Observed symptom.
+    pub what: String,
+    /// Suggested remedy.
+    pub remedy: Remedy,
+}
+
+/// Reason why a simulation did not reach a time.
+#[derive(Debug, thiserror::Error)]
+pub enum AdvanceError {
+    /// The time is not finite; the state of the simulation has not changed.
     #[error("the time to advance to must be finite, not {time} s")]
     NotFinite {
         /// Time [s].
         time: f64,
     },
-    /// The state is not finite, the CFL number is too large, grains overlap too far, or a grain of
-    /// a run with a refined box reaches a free surface.
-    #[error("{}; try {remedy}", symptom(*time, *step, what, remedy))]
-    Unstable {
-        /// Time [s].
-        time: f64,
-        /// Number of the step.
-        step: u64,
-        /// Observed symptom.
-        what: String,
-        /// Suggested remedy.
-        remedy: Remedy,
-    },
+    /// A step failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
 }
 
 impl StepError {
     /// Returns the message with an advice in the given terms.
     pub fn message(&self, terms: &RemedyTerms) -> String {
-        match self {
-            StepError::Unstable { time, step, what, remedy } => {
-                format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
-            }
-            StepError::NotFinite { .. } => self.to_string(),
-        }
+        let StepError { time, step, what, remedy } = self;
+        format!("{}; try {}", symptom(*time, *step, what, remedy), remedy.advice(terms))
     }
 }
 

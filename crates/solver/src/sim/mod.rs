@@ -37,7 +37,7 @@ use timing::PassTimes;
 
 pub use control::{ControlError, MotionComponent};
 pub use diagnostics::Diagnostics;
-pub use failure::{Remedy, RemedyTerms, StepError};
+pub use failure::{AdvanceError, Remedy, RemedyTerms, StepError};
 pub use fields::{AnyFieldView, CELL_FIELDS, CellField};
 pub use prescription::{PrescribedMotion, Prescription};
 pub use refinement::LEAST_REFINEMENT_MARGIN;

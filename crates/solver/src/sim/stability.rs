@@ -33,7 +33,7 @@ impl Simulation {
     /// below its bound, and no grain of a run with a refined box reaches a free surface.
     pub(super) fn check_stability(&self) -> Result<(), StepError> {
         let unstable = |what: String, remedy: Remedy| {
-            Err(StepError::Unstable { time: self.clock.time, step: self.clock.steps, what, remedy })
+            Err(StepError { time: self.clock.time, step: self.clock.steps, what, remedy })
         };
         for (i, grain) in self.setup.grains.iter().enumerate() {
             let finite = (grain.pose.position.is_finite() || grain.has_left())

@@ -1,7 +1,7 @@
 //! The time step: the equations of section 2 of the paper, in the order of decision 0014.
 
 use super::stages::Start;
-use super::{Simulation, StepError};
+use super::{AdvanceError, Simulation, StepError};
 
 /// Relative difference below which two times count as equal.
 pub const SAME_TIME: f64 = 1e-9;
@@ -10,11 +10,11 @@ impl Simulation {
     /// Advances the simulation to `time` [s], in steps of which the last ends there.
     ///
     /// # Errors
-    /// [`StepError::NotFinite`] if `time` is not finite; [`StepError::Unstable`] as in
+    /// [`AdvanceError::NotFinite`] if `time` is not finite; [`AdvanceError::Step`] as in
     /// [`Simulation::step`].
-    pub fn advance_to(&mut self, time: f64) -> Result<(), StepError> {
+    pub fn advance_to(&mut self, time: f64) -> Result<(), AdvanceError> {
         if !time.is_finite() {
-            return Err(StepError::NotFinite { time });
+            return Err(AdvanceError::NotFinite { time });
         }
         while self.clock.time < time * (1.0 - SAME_TIME) {
             self.step(time - self.clock.time)?;
@@ -32,7 +32,7 @@ impl Simulation {
     /// If `horizon` is not positive.
     ///
     /// # Errors
-    /// [`StepError::Unstable`] if the state is no longer finite, the CFL number has jumped, grains
+    /// [`StepError`] if the state is no longer finite, the CFL number has jumped, grains
     /// overlap beyond their limit, or a grain of a run with a refined box reaches a free surface.
     /// The simulation cannot be continued from such a state.
     pub fn step(&mut self, horizon: f64) -> Result<(), StepError> {

@@ -8,6 +8,7 @@ use super::observation::{Member, members};
 use super::statistics::{bootstrap_interval, share_interval};
 use crate::measure::mean;
 use crate::measure::record::RunRecord;
+use crate::plan::Factors;
 use crate::plan::claims::{Analysis, Condition};
 
 /// Name of the share of runs in which the pair comes into contact before it lands.
@@ -40,7 +41,7 @@ pub struct FactorMean {
 
 /// A model: its factors and the values of its members.
 struct Model<'a> {
-    factors: &'a BTreeMap<String, f64>,
+    factors: &'a Factors,
     values: Vec<f64>,
 }
 

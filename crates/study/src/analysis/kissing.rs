@@ -178,7 +178,7 @@ pub fn kissing(analysis: &Analysis, records: &[RunRecord]) -> Option<KissingResu
 fn outcomes(records: &[RunRecord]) -> Vec<Outcomes> {
     let duration = |(run, time, censored): Member| (run.member, Duration { time, censored });
     let outcomes = |members: Vec<Member>| Outcomes {
-        levels: members[0].0.levels.clone(),
+        levels: members[0].0.levels.clone().into_iter().collect(),
         members: members.into_iter().map(duration).collect(),
     };
     let models = members(records, "kiss_time", &BTreeMap::new()).into_iter().map(outcomes);

@@ -150,8 +150,8 @@ pub fn observations(
         let range = extent(events()).or_else(|| extent(values.iter().copied()))?;
         Some(Observation {
             model: first.model.clone(),
-            levels: first.levels.clone(),
-            factors: first.factors.clone(),
+            levels: first.levels.clone().into_iter().collect(),
+            factors: first.factors.clone().into_iter().collect(),
             value,
             durations,
             range,

@@ -1,6 +1,5 @@
 //! The record of a run: its state, its factors and its measured values.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
@@ -14,7 +13,7 @@ use super::mean;
 use super::pair::PairMeasures;
 use super::settling::SettlingMeasures;
 use crate::error::{StudyError, read_rows};
-use crate::plan::{Plan, Run, TABLE};
+use crate::plan::{Factors, Levels, Plan, Run, TABLE};
 use crate::run::state::{RunState, StateKind, folder_state};
 
 /// A run and its measured values. The JSON names are stable.
@@ -27,9 +26,9 @@ pub struct RunRecord {
     /// Index in the ensemble.
     pub member: usize,
     /// Level on each axis.
-    pub levels: BTreeMap<String, String>,
+    pub levels: Levels,
     /// Numerical factors.
-    pub factors: BTreeMap<String, f64>,
+    pub factors: Factors,
     /// State.
     pub state: StateKind,
     /// Reason of a failed or stale run, or what is wrong with the files of a finished one.

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::record::RunRecord;
 use super::settling::GrainSettling;
+use crate::analysis::observation::unique;
 use crate::error::{At, StudyError, read_rows, write_file, write_json};
 use crate::format::rounded;
 use crate::plan::quantities::{FIRST_COLUMNS, LAST_COLUMNS, PAIR_QUANTITIES, SETTLING_QUANTITIES};
@@ -104,8 +105,8 @@ pub fn to_csv(records: &[RunRecord]) -> String {
 }
 
 fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
-    let axes: BTreeSet<&String> = records.iter().flat_map(|r| r.levels.keys()).collect();
-    let factors: BTreeSet<&String> = records.iter().flat_map(|r| r.factors.keys()).collect();
+    let axes = unique(records.iter().flat_map(|r| r.levels.keys()));
+    let factors = unique(records.iter().flat_map(|r| r.factors.keys()));
     let quantities = columns(records);
     let pairs = quantities.contains(&"kiss_time");
     let mut header = FIRST_COLUMNS.to_vec();
@@ -115,8 +116,8 @@ fn rows(records: &[RunRecord]) -> Vec<Vec<String>> {
     let row = |r: &RunRecord| {
         let member = r.member.to_string();
         let mut cells = vec![r.name.clone(), r.model.clone(), member, r.state.to_string()];
-        cells.extend(axes.iter().map(|a| r.levels.get(*a).cloned().unwrap_or_default()));
-        cells.extend(factors.iter().map(|f| text(r.factors.get(*f), f64::to_string)));
+        cells.extend(axes.iter().map(|a| r.levels.get(a).cloned().unwrap_or_default()));
+        cells.extend(factors.iter().map(|f| text(r.factors.get(f), f64::to_string)));
         cells.extend(quantities.iter().map(|q| number(r.measured(q))));
         cells.push(text(r.diameter_m, |v| format!("{v:e}")));
         cells.extend(pairs.then(|| number(r.kiss_time_s)));
@@ -138,4 +139,27 @@ fn text<T>(value: Option<T>, form: impl Fn(T) -> String) -> String {
 
 fn number(value: Option<f64>) -> String {
     text(value, |v| rounded(v).to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_and_factors_keep_the_order_of_the_study_file() {
+        let levels = [("weight", "light"), ("grip", "rough")];
+        let factors = [("density", 1500.0), ("angle", 30.0)];
+        let record = RunRecord {
+            levels: levels.map(|(axis, level)| (axis.to_owned(), level.to_owned())).into(),
+            factors: factors.map(|(name, value)| (name.to_owned(), value)).into(),
+            ..RunRecord::default()
+        };
+        // A model outside the axes comes first.
+        let records = [RunRecord::default(), record];
+        let text = serde_json::to_string(&records).unwrap();
+        let again: Vec<RunRecord> = serde_json::from_str(&text).unwrap();
+        let csv = to_csv(&again);
+        assert!(csv.starts_with("run,model,member,state,weight,grip,density,angle,"), "{csv}");
+        assert!(csv.lines().nth(2).unwrap().contains(",light,rough,1500,30,"), "{csv}");
+    }
 }

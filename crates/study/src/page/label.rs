@@ -53,8 +53,13 @@ const LABELS: [(&str, &str, &str); 40] = [
     ("wadell_roundness", "Wadell roundness", "[–]"),
 ];
 
+/// Returns whether the label of a quantity or factor is part of the program.
+pub(super) fn known(quantity: &str) -> bool {
+    LABELS.iter().any(|(key, ..)| *key == quantity)
+}
+
 /// Returns the label of an axis with name, symbol and unit; the name alone for a factor of the
-/// study file, whose unit is unknown.
+/// study file, which has no unit of its own.
 pub(super) fn label(quantity: &str) -> String {
     match LABELS.iter().find(|(key, ..)| *key == quantity) {
         Some((_, name, unit)) => format!("{name}  {unit}"),

@@ -1,6 +1,6 @@
 //! Expansion of a study file into models: every combination of the axes, then single models.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +9,7 @@ use toml::Value;
 
 use super::quantities::is_column;
 use super::raw::{RawAxis, RawFactors, RawModel, RawSet, RawStudy, RawValue};
+use super::{Factors, Levels};
 
 /// Largest number of runs of a study.
 pub(crate) const MOST_RUNS: usize = 100_000;
@@ -41,9 +42,9 @@ pub struct Model {
     /// Overrides of the base case; later ones take precedence.
     pub settings: Vec<Setting>,
     /// Level on each axis; empty for a model outside the axes.
-    pub levels: BTreeMap<String, String>,
+    pub levels: Levels,
     /// Numerical factors for the analysis.
-    pub factors: BTreeMap<String, f64>,
+    pub factors: Factors,
 }
 
 /// Expands a study file into models.
@@ -358,7 +359,7 @@ fn single(
         name: own.name.value.clone(),
         base: path,
         settings: common.iter().cloned().chain(settings(&own.set)).collect(),
-        levels: BTreeMap::new(),
+        levels: Levels::new(),
         factors: numbers(&own.factors).collect(),
     })
 }

@@ -11,12 +11,12 @@ mod rebuild;
 mod resolve;
 pub mod selection;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk::{self, is_temporary};
 use grainwake_run::case::{Case, CaseError, Problem};
 use grainwake_run::provenance::Provenance;
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use self::claims::Analysis;
@@ -47,6 +47,11 @@ const WRITTEN: [&str; 9] = [
     "report.html",
 ];
 
+/// Level on each axis, in the order of the study file.
+pub type Levels = IndexMap<String, String>;
+/// Numerical factors, in the order of the axes.
+pub type Factors = IndexMap<String, f64>;
+
 /// One run of a study. The JSON names are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
@@ -57,9 +62,9 @@ pub struct Run {
     /// Index in the ensemble; 0 starts as the case says.
     pub member: usize,
     /// Level on each axis.
-    pub levels: BTreeMap<String, String>,
+    pub levels: Levels,
     /// Numerical factors for the analysis.
-    pub factors: BTreeMap<String, f64>,
+    pub factors: Factors,
     /// Base case.
     pub base: PathBuf,
     /// Overrides in the syntax of `--set`.

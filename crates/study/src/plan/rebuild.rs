@@ -9,7 +9,7 @@ use grainwake_run::provenance::Provenance;
 
 use super::claims::Analysis;
 use super::resolve::run_of_case;
-use super::{Plan, RUNS, Run, TABLE};
+use super::{Factors, Levels, Plan, RUNS, Run, TABLE};
 use crate::error::{StudyError, read_rows};
 
 /// Entry of `table.json`, as far as a plan needs it.
@@ -19,9 +19,9 @@ struct Entry {
     model: String,
     member: usize,
     #[serde(default)]
-    levels: BTreeMap<String, String>,
+    levels: Levels,
     #[serde(default)]
-    factors: BTreeMap<String, f64>,
+    factors: Factors,
     #[serde(default)]
     id: String,
 }

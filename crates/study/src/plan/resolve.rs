@@ -12,7 +12,7 @@ use super::expand::Model;
 use super::file::{Ensemble, Study};
 use super::offset::member_overrides;
 use super::quantities::SHAPE_FACTORS;
-use super::{Plan, Run};
+use super::{Factors, Plan, Run};
 use crate::error::StudyError;
 
 impl Plan {
@@ -90,7 +90,11 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
     }
     run.member = member;
     run.levels = model.levels.clone();
-    run.factors.extend(model.factors.clone());
+    // Those of the study file come first, also in the table.
+    let of_shape = std::mem::replace(&mut run.factors, model.factors.clone());
+    for (name, value) in of_shape {
+        run.factors.entry(name).or_insert(value);
+    }
     run
 }
 
@@ -131,8 +135,8 @@ pub(super) fn run_id(case_sha256: &str, ending: &str, version: &str, commit: &st
 }
 
 /// Returns the shape factors of the first grain.
-fn shape_factors(case: &Case) -> BTreeMap<String, f64> {
-    let mut factors = BTreeMap::new();
+fn shape_factors(case: &Case) -> Factors {
+    let mut factors = Factors::new();
     if let Some(grain) = case.setup.grains.first() {
         let shape = grain.shape.morphology();
         let values = [Some(shape.krumbein_sphericity), shape.wadell_roundness];

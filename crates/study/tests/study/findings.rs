@@ -35,8 +35,8 @@ fn row(
     RunRecord {
         name: name.into(),
         model: name.into(),
-        levels,
-        factors,
+        levels: levels.into_iter().collect(),
+        factors: factors.into_iter().collect(),
         state: StateKind::Finished,
         diameter_m: Some(2e-3),
         gravity_m_per_s2: Some([0.0, 0.0, -9.81]),

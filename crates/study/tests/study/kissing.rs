@@ -14,7 +14,7 @@ fn record(levels: [(&str, &str); 3], member: usize, kiss: Option<f64>) -> RunRec
         name: format!("{model}-m{member}"),
         model,
         member,
-        levels,
+        levels: levels.into_iter().collect(),
         state: StateKind::Finished,
         pair: Some(PairMeasures {
             kiss_time: kiss,

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use grainwake_plot::style::{SMALL, TEXT};
+use grainwake_plot::style::TEXT;
 use grainwake_plot::{minus, text};
 use grainwake_run::RESOLVED;
 use grainwake_run::case::Case;
 
+use super::factor_unit::label_with_unit;
 use super::line_style::{LineStyle, OUTSIDE};
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
@@ -109,6 +110,12 @@ impl FigureData<'_> {
         if text::width(&label, TEXT) <= width { label } else { self.factor_value(factor, value) }
     }
 
+    /// Returns the label of the axis of a quantity or factor; of a factor with its unit, if a
+    /// setting of the study file has it.
+    pub fn axis_label(&self, name: &str) -> String {
+        label_with_unit(&self.whole.runs, name)
+    }
+
     /// Returns the symbol of a factor of rows or columns: its first letter in italics; its name if
     /// both factors begin with that letter.
     fn symbol(&self, factor: &str) -> String {
@@ -148,22 +155,6 @@ fn rounded_text(value: f64, digits: usize) -> String {
     minus(&if text.contains('.') && text.len() == 3 { format!("{text}0") } else { text })
 }
 
-/// Returns a name as a small label of at most `width` [pt]; a long one lacks its middle.
-pub fn fitting_name(name: &str, width: f64) -> String {
-    let all: Vec<char> = name.chars().collect();
-    let shortened = |kept: usize| {
-        let head: String = all[..kept.div_ceil(2)].iter().collect();
-        let tail: String = all[all.len() - kept / 2..].iter().collect();
-        if kept == all.len() {
-            text::literal(name)
-        } else {
-            text::literal(&format!("{head}…{tail}"))
-        }
-    };
-    let mut labels = (0..=all.len()).rev().map(shortened);
-    labels.find(|label| text::width(label, SMALL) <= width).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,15 +164,6 @@ mod tests {
         let texts = [0.0, 0.4, 0.45, 2.0, 1400.0, 0.0123, 0.0001].map(value_text);
         assert_eq!(texts, ["0", "0.40", "0.45", "2", "1400", "0.0123", "0.0001"]);
         assert_eq!([-0.25, 1.5e-12, 2e9].map(value_text), ["−0.25", "1.5·10^{−12}", "2·10^{9}"]);
-    }
-
-    #[test]
-    fn long_names_lack_their_middle() {
-        assert_eq!(fitting_name("g_01", 60.0), "g\\_01");
-        let label = fitting_name("sphere-number-12-of-a-long-name", 60.0);
-        assert!(label.starts_with("sphere-") && label.ends_with("-name"), "{label}");
-        assert!(label.contains('…') && text::width(&label, SMALL) <= 60.0);
-        assert_eq!(fitting_name("g", 0.0), "");
     }
 
     /// Data of a plan with models of the given values of two factors.

@@ -49,7 +49,10 @@ pub fn figure(data: &FigureData) -> Option<Figure> {
     legend.draw(&mut drawing, (LEFT, 5.0));
     let count = factors.len().min(ACROSS) as f64;
     let width = (PAGE - LEFT - 8.0 - GAP * (count - 1.0)) / count;
-    let column = |factor: &String| Column::new(means, factor, levels.len(), width);
+    let column = |factor: &String| {
+        let label = data.axis_label(factor);
+        Column::new(means, (factor, &label), levels.len(), width)
+    };
     let columns = factors.iter().map(column).collect::<Option<Vec<Column>>>()?;
     for (row, quantity) in quantities.iter().enumerate() {
         let here = || means.iter().filter(|m| m.quantity == *quantity);
@@ -123,8 +126,13 @@ struct Column {
 
 impl Column {
     /// Creates the column of a factor with panels `width` [pt] wide, from means in ascending order
-    /// of the factor; none if it has no values.
-    fn new(means: &[FactorMean], factor: &str, levels: usize, width: f64) -> Option<Column> {
+    /// of the factor; none if it has no values. The factor comes with the label of its axis.
+    fn new(
+        means: &[FactorMean],
+        (factor, label): (&str, &str),
+        levels: usize,
+        width: f64,
+    ) -> Option<Column> {
         let own: Vec<&FactorMean> = means.iter().filter(|m| m.factor == factor).collect();
         let (first, last) = extent(own.iter().map(|m| m.at))?;
         let range = (last - first).max(0.1 * last.abs()).max(f64::MIN_POSITIVE);
@@ -143,7 +151,7 @@ impl Column {
         let margin = range * f64::max(0.06, outer / (width - 2.0 * outer));
         let (first, last) = (first - margin, last + margin);
         let ticks = (width / 20.0).clamp(2.0, 5.0) as usize;
-        let axis = Axis::linear(&label(factor), first, last, ticks, AxisRange::Tight);
+        let axis = Axis::linear(label, first, last, ticks, AxisRange::Tight);
         Some(Column { factor: factor.to_owned(), axis, aside })
     }
 }
@@ -169,7 +177,7 @@ mod tests {
             let own = values.iter().enumerate().filter(|(i, _)| shared || *i == level);
             means.extend(own.map(|(_, at)| mean(level, *at)));
         }
-        let column = Column::new(&means, "density", levels, width).unwrap();
+        let column = Column::new(&means, ("density", "density"), levels, width).unwrap();
         let outer = 0.5 * column.aside * (levels as f64 - 1.0);
         (column, outer)
     }

@@ -9,7 +9,7 @@ use grainwake_shape::Shape;
 use grainwake_shape::render::{Picture, View};
 use grainwake_solver::dem::Grain;
 
-use super::data::{FigureData, fitting_name, value_text};
+use super::data::{FigureData, value_text};
 use crate::plan::Run;
 
 /// Pixels of a picture per point of the page.
@@ -69,7 +69,7 @@ pub fn family(data: &FigureData, notes: &mut Vec<String>) -> Option<Figure> {
         drawing.raster(x, y, cell, height, cropped(picture, height));
         let base = y + row_height - 4.0 - 0.36 * SMALL;
         let place = (x + 0.5 * cell, base);
-        drawing.note(place, Anchor::Middle, &fitting_name(name, cell - 4.0));
+        drawing.note(place, Anchor::Middle, &text::fitting(name, SMALL, cell - 4.0));
     }
     for (n, value) in across.iter().enumerate() {
         let place = (left + cell * (n as f64 + 0.5), 9.0);

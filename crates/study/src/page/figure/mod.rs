@@ -3,6 +3,7 @@
 mod claims;
 mod data;
 mod factor_means;
+mod factor_unit;
 mod grains;
 mod histories;
 mod kissing_share;

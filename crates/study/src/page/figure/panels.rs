@@ -14,7 +14,6 @@ use super::legend::{LineStyles, axes};
 use super::misses::{self, STRIP};
 use crate::analysis::observation::{Observation, is_time, observations, other_levels, unique};
 use crate::format::missed;
-use crate::page::label::label;
 use crate::plan::Run;
 use crate::plan::quantities::SHAPE_FACTORS;
 
@@ -60,8 +59,8 @@ struct Parameter {
 
 impl Parameter {
     /// Returns the horizontal axis; none without coordinates.
-    fn across(&self) -> Option<Axis> {
-        let label = label(&self.name);
+    fn across(&self, data: &FigureData) -> Option<Axis> {
+        let label = data.axis_label(&self.name);
         if let Some(names) = &self.names {
             let names = names.iter().map(|name| text::literal(name)).collect();
             return Some(Axis::categories(&label, names));
@@ -172,7 +171,7 @@ pub(super) fn against_parameters(
             y: 0.0,
             width,
             height: HEIGHT,
-            across: parameter.across()?,
+            across: parameter.across(data)?,
             up: Axis::linear(texts.up, low, high, 5, AxisRange::Rounded),
         })
     };
