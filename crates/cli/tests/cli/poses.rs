@@ -260,3 +260,21 @@ fn tables_that_cannot_be_used_are_refused_with_their_place() {
     let refused = message(&run(&next, &out, &[]).code(2));
     assert!(refused.contains("incomplete") && refused.contains("5 of 8 grains"), "{refused}");
 }
+
+#[test]
+fn the_heap_of_the_example_is_the_end_of_its_first_run() {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/settled-heap");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("settle");
+    run(&example.join("settle.toml"), &out, &[]).success();
+    let settled = rows(&out);
+    let table = std::fs::read_to_string(example.join("heap.csv")).unwrap();
+    let heap: Vec<&str> = table.lines().skip(1).collect();
+    assert_eq!(heap.len(), 20);
+    for (line, row) in heap.iter().zip(&settled[settled.len() - 20..]) {
+        let kept: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let ends = [&row[..2], &row[POSITION], &row[ORIENTATION]].concat();
+        let off = kept.iter().zip(&ends).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{line}: off by {off}");
+    }
+}
