@@ -39,7 +39,7 @@ fuzz_target!(|bytes: &[u8]| {
         "run.pvd" => drop(pvd::read(&path)),
         "slice.vti" => drop(vti::read(&path)),
         "grains.vtp" => drop(vtp::read(&path)),
-        "poses.csv" => drop(poses::read(&path, Some(0.01))),
+        "poses.csv" => drop(poses::read(&path, poses::Origin::Own, Some(0.01))),
         "study.json" => drop(Plan::read_or_rebuild(folder::folder())),
         _ => {}
     }

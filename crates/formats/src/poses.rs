@@ -59,14 +59,28 @@ pub struct Poses {
     pub poses: Vec<Pose>,
     /// Number of rows at the time before; none for the first time.
     pub rows_before: Option<usize>,
+    /// Whether the table has velocities or angular velocities.
+    pub has_velocities: bool,
+}
+
+/// Origin of a table of poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// A run, which may have been interrupted: an unfinished last line is left out.
+    Run,
+    /// A file of one's own: its last line is whole, although it may lack its line break.
+    Own,
 }
 
 /// Reads the poses at the latest time that is not after `at` [s], or at the last time of all.
 ///
 /// # Errors
 /// [`FormatError`] with the first damaged line, or if no row is at or before `at`.
-pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
-    let table = Table::read(file, &mut Vec::new())?;
+pub fn read(file: &Path, origin: Origin, at: Option<f64>) -> Result<Poses, FormatError> {
+    let table = match origin {
+        Origin::Run => Table::read(file, &mut Vec::new())?,
+        Origin::Own => Table::read_whole(file)?,
+    };
     let known = || READ.split(", ").chain(IGNORED);
     let is_known = |name: &str| {
         let name = name.strip_suffix(SCALED).unwrap_or(name);
@@ -147,7 +161,8 @@ pub fn read(file: &Path, at: Option<f64>) -> Result<Poses, FormatError> {
         });
     }
     poses.sort_by_key(|pose| pose.grain);
-    Ok(Poses { time, poses, rows_before })
+    let has_velocities = velocity.is_some() || spin.is_some();
+    Ok(Poses { time, poses, rows_before, has_velocities })
 }
 
 /// Rows of a table at one time.
@@ -200,7 +215,25 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("poses.csv");
         std::fs::write(&file, text).unwrap();
-        read(&file, at).map_err(|error| error.to_string())
+        read(&file, Origin::Own, at).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn the_last_line_of_a_table_of_ones_own_may_lack_its_line_break() {
+        let text = "grain,x,y,z\n0,1,0,0\n1,2,0,0";
+        let of_both = of(text, None).unwrap();
+        assert_eq!(of_both.poses.len(), 2);
+        assert_eq!(of_both.poses[1].position, DVec3::new(2.0, 0.0, 0.0));
+        assert!(!of_both.has_velocities);
+        let cut = of(&text[..text.len() - 2], None).unwrap_err();
+        assert!(cut.contains("line 3: 3 values under 4 columns"), "{cut}");
+        // A run that was interrupted may have written a part of its last line.
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("grains.csv");
+        std::fs::write(&file, text).unwrap();
+        assert_eq!(read(&file, Origin::Run, None).unwrap().poses.len(), 1);
+        let spins = of("x,y,z,wx,wy,wz\n1,2,3,4,5,6\n", None).unwrap();
+        assert!(spins.has_velocities);
     }
 
     #[test]
@@ -230,6 +263,7 @@ mod tests {
             ("x,y,z,diameter\n1,2,3,4\n", "line 1: unknown column 'diameter'"),
             ("x,y,z,qw\n1,2,3,1\n", "line 1: the columns qw, qx, qy, qz must"),
             ("x,y,z\n", "line 1: the table has no rows"),
+            ("x,y,z,x\n1,2,3,4\n", "line 1: two columns of the name 'x'"),
             ("x,y,z\n1,2,\n", "line 2: the position is not finite"),
             ("x,y,z,density\n1,2,3,-1\n", "line 2: -1 under 'density'"),
             ("grain,x,y,z\n0,1,2,3\n0,1,2,3\n", "line 3: a second row for grain 0"),

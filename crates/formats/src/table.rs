@@ -80,6 +80,23 @@ impl Table {
             notes.push(unfinished_line(file, text.lines().count()));
             text.truncate(complete);
         }
+        Table::parse(file, &text, notes, damage)
+    }
+
+    /// Reads a table whose last line is whole, although it may lack its line break.
+    ///
+    /// # Errors
+    /// [`FormatError`] with the first damaged line.
+    pub fn read_whole(file: &Path) -> Result<Table, FormatError> {
+        Table::parse(file, &read_text(file)?, &mut Vec::new(), Damage::Refuse)
+    }
+
+    fn parse(
+        file: &Path,
+        text: &str,
+        notes: &mut Vec<String>,
+        damage: Damage,
+    ) -> Result<Table, FormatError> {
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -101,6 +118,9 @@ impl Table {
         let names: Vec<String> = header.iter().map(str::to_owned).collect();
         if names.iter().any(String::is_empty) {
             return Err(damaged(&header, "a column without a name".to_owned()));
+        }
+        if let Some(n) = (1..names.len()).find(|n| names[..*n].contains(&names[*n])) {
+            return Err(damaged(&header, format!("two columns of the name '{}'", names[n])));
         }
         let mut columns = vec![Vec::new(); names.len()];
         for record in records {

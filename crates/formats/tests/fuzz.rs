@@ -23,7 +23,9 @@ fn read(path: &Path) -> Option<Result<(), String>> {
         "run.pvd" => pvd::read(path).map(drop),
         "slice.vti" => vti::read(path).map(drop).map_err(|e| e.to_string()),
         "grains.vtp" => vtp::read(path).map(drop),
-        "poses.csv" => poses::read(path, Some(0.01)).map(drop).map_err(|e| e.to_string()),
+        "poses.csv" => {
+            poses::read(path, poses::Origin::Own, Some(0.01)).map(drop).map_err(|e| e.to_string())
+        }
         _ => return None,
     })
 }

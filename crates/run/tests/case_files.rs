@@ -309,8 +309,11 @@ fn boundaries_must_belong_together() {
     with(
         "x = { kind = \"slip\", velocity = [0, 0.1, 0] }",
         "domain.boundaries.x",
-        &["no velocity"],
+        &["kind \"slip\" has no velocity"],
     );
+    let two = "z = [\"wall\", \"free-surface\"], x = [\"free-surface\", \"wall\"]";
+    with(two, "domain.boundaries.z.1", &["a second free surface; the box can have one"]);
+    with("z = \"free-surface\"", "domain.boundaries.z", &["second free surface", "slip"]);
     let count = |faces: &str| {
         let boundaries = format!("cell_size = \"0.25 mm\"\nboundaries = {{ {faces} }}");
         problems(&PAIR.replace("cell_size = \"0.25 mm\"", &boundaries)).len()
@@ -524,6 +527,13 @@ fn refinement_is_not_advised_for_grains_that_float_in_a_free_surface() {
     );
     let refined = warnings(&floating.replace("[domain]", "[domain]\nrefinement = 2"));
     assert!(refined.contains("floats up to the free surface"), "{refined}");
+    // At the surface from the start: the run would stop after its first step.
+    let there = floating.replace("\"80 mm\"", "\"97 mm\"");
+    good(&there);
+    let refused = problems(&there.replace("[domain]", "[domain]\nrefinement = 2"));
+    let all = format!("{refused:?}");
+    assert!(all.contains("grain 0 reaches 0.5 mm beyond the free surface"), "{all}");
+    assert_eq!(refused[0].key.as_deref(), Some("grain.0.position"), "{all}");
 }
 
 #[test]
@@ -897,6 +907,14 @@ fn packings_become_grains() {
     }
     let d: Vec<f64> = case.setup.grains.iter().map(|g| g.shape.equivalent_diameter()).collect();
     assert!(d.iter().all(|d| (2e-3..4e-3).contains(d)) && d[0] != d[1]);
+    // A velocity beside a prescribed one is refused, as for a [[grain]].
+    let stop = "stop = { when = \"rest\", hold = \"10 ms\" }";
+    let fixed = text.replace(stop, "").replace("seed = 3", "seed = 3\nmotion = \"fixed\"");
+    good(&fixed);
+    let moving = problems(&fixed.replace("seed = 3", "seed = 3\nvelocity = [0, 0, 0.1]"));
+    assert_eq!(moving.len(), 1, "{moving:?}");
+    assert_eq!(moving[0].key.as_deref(), Some("packing.0.velocity"));
+    assert!(moving[0].message.contains("the motion prescribes [0 m/s"), "{}", moving[0]);
     let crowded = problems(&text.replace("count = 60", "count = 60000"));
     assert!(crowded[0].message.contains("sites for 60000 grains"), "{}", crowded[0]);
     assert_eq!(crowded.len(), 1, "{crowded:?}");

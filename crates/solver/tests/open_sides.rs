@@ -346,6 +346,47 @@ fn the_momentum_of_a_floating_grain_is_conserved() {
 }
 
 #[test]
+fn grains_above_a_free_surface_fall_and_collide_as_without_fluid() {
+    let speed = 0.5;
+    let surface = [Boundary::WALL, Boundary::FreeSurface];
+    for density in [0.5, 2.0] {
+        // 4 cells above the surface.
+        let first = sphere(density, [1.2, 2.0, 5.0]).with_velocity(DVec3::X * speed);
+        let pair = vec![first, sphere(density, [2.5, 2.0, 5.0])];
+        let case = setup([32; 3], surface, 0.01, pair).with_gravity(DVec3::ZERO);
+        let mut sim = Simulation::new(case).unwrap();
+        sim.advance_to(1.5).unwrap();
+        let [first, second] = [0, 1].map(|n| sim.grains()[n].velocity.x / speed);
+        assert!(first.abs() < 0.01 && (second - 1.0).abs() < 0.01, "{density}: {first} {second}");
+        let case = setup([32; 3], surface, 0.01, vec![sphere(density, [2.0, 2.0, 6.0])]);
+        let mut sim = Simulation::new(case).unwrap();
+        for _ in 0..5 {
+            step(&mut sim);
+            let (speed, time) = (-sim.grains()[0].velocity.z, sim.time());
+            assert!((speed / time - 1.0).abs() < 1e-12, "{density}: {speed} at {time}");
+            assert_eq!(sim.loads()[0], Default::default());
+        }
+        // Into the water: its buoyancy and drag act again.
+        sim.advance_to(2.2).unwrap();
+        assert!(sim.loads()[0].force.z > 0.0 && -sim.grains()[0].velocity.z < 2.15);
+    }
+}
+
+#[test]
+fn a_grain_that_leaves_gains_no_energy_from_an_impact() {
+    let speed = 0.5;
+    for density in [0.5, 2.0] {
+        // 1.2 cells from the outflow: it departs from the start. The drag is small.
+        let grain = sphere(density, [3.3, 2.0, 0.65]).with_velocity(DVec3::X * speed);
+        let case = setup([32; 3], [Boundary::Outflow, Boundary::WALL], 1e-6, vec![grain]);
+        let mut sim = Simulation::new(case.with_gravity(DVec3::ZERO)).unwrap();
+        sim.advance_to(1.0).unwrap();
+        let rebound = -sim.grains()[0].velocity.x / speed;
+        assert!((0.9..1.005).contains(&rebound), "{density}: {rebound} of the speed");
+    }
+}
+
+#[test]
 fn a_grain_of_prescribed_velocity_is_at_rest_when_it_has_left() {
     let mut moved = sphere(2.0, [2.0, 2.0, 0.7]);
     moved.velocity = DVec3::new(0.0, 0.0, -1.0);

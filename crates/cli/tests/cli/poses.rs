@@ -231,6 +231,10 @@ fn tables_that_cannot_be_used_are_refused_with_their_place() {
         ("file = \"one.csv\"\ndensity = 2500\n".to_owned(), "no shape"),
         (format!("file = \"one.csv\"\ndensity = 2500\ntime = 1\n{sphere}"), "no column 'time'"),
         (format!("file = \"one.csv\"\ndensity = -1\n{sphere}"), "greater than zero"),
+        (
+            format!("file = \"one.csv\"\ndensity = 2500\nvelocities = true\n{sphere}"),
+            "poses.0.velocities: ",
+        ),
     ];
     let out = folder.path().join("out");
     for (keys, said) in cases {
@@ -239,6 +243,12 @@ fn tables_that_cannot_be_used_are_refused_with_their_place() {
         assert!(refused.contains(said) && refused.contains("next.toml:"), "{keys}: {refused}");
     }
     assert!(!out.exists());
+    // A table of one's own may lack its last line break: the last grain was left out.
+    std::fs::write(folder.path().join("two.csv"), "x,y,z\n2e-3,2e-3,2e-3\n2e-3,2e-3,4e-3").unwrap();
+    write(&next, NEXT, &format!("file = \"two.csv\"\ndensity = 2500\n{sphere}"));
+    let both = grainwake().arg("check").arg(&next).assert().success();
+    let both = String::from_utf8_lossy(&both.get_output().stdout).into_owned();
+    assert!(both.contains(" 2, equivalent diameter 1 mm"), "{both}");
     // The last rows of a run that was killed may lack grains.
     let killed = folder.path().join("killed");
     std::fs::create_dir(&killed).unwrap();
@@ -249,4 +259,22 @@ fn tables_that_cannot_be_used_are_refused_with_their_place() {
     write(&next, NEXT, "run = \"killed\"\n");
     let refused = message(&run(&next, &out, &[]).code(2));
     assert!(refused.contains("incomplete") && refused.contains("5 of 8 grains"), "{refused}");
+}
+
+#[test]
+fn the_heap_of_the_example_is_the_end_of_its_first_run() {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/settled-heap");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("settle");
+    run(&example.join("settle.toml"), &out, &[]).success();
+    let settled = rows(&out);
+    let table = std::fs::read_to_string(example.join("heap.csv")).unwrap();
+    let heap: Vec<&str> = table.lines().skip(1).collect();
+    assert_eq!(heap.len(), 20);
+    for (line, row) in heap.iter().zip(&settled[settled.len() - 20..]) {
+        let kept: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let ends = [&row[..2], &row[POSITION], &row[ORIENTATION]].concat();
+        let off = kept.iter().zip(&ends).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{line}: off by {off}");
+    }
 }

@@ -7,6 +7,7 @@
 //!   ([`Grain::leave`]).
 //! - **Emerging.** The part beyond a free surface has no buoyancy and displaces no fluid
 //!   (`emerged.rs`). The pressure that acts on the grain is relative to that at the open surface.
+//!   A grain that is more than [`MARGIN`] cells beyond the surface moves as without fluid.
 //!
 //! The boundary faces that a grain covers move with it (`flow/open_boundary.rs`).
 
@@ -23,7 +24,8 @@ use crate::flow::{Boundaries, Boundary, BoxSide, CoveredFace, FluidParams};
 use crate::grid::Mesh;
 use crate::math::{Load, RigidVelocity, multiply6};
 
-/// Cells before an open side from which on a grain moves under its last hydrodynamic load.
+/// Cells before an open side from which on a grain moves under its last hydrodynamic load, and
+/// cells between a grain beyond a free surface and the fluid from which on it moves without fluid.
 const MARGIN: f64 = 2.0;
 
 /// Distance from a side up to which a grain is close to it, in bounding radii.
@@ -37,6 +39,8 @@ pub enum Crossing {
     Inside,
     /// A part of the grain is beyond a free surface.
     Emerged(Box<EmergedPart>),
+    /// The whole grain is beyond a free surface and far from the fluid, which it does not feel.
+    Airborne(Box<EmergedPart>),
     /// The grain is about to leave and moves under its last hydrodynamic load; the normals of the
     /// sides, and its part beyond a free surface, if there is one.
     Departing(BVec3, Option<Box<EmergedPart>>),
@@ -144,7 +148,7 @@ impl OpenSides {
         if grain.has_left() {
             return Crossing::Left;
         }
-        let (mut departing, mut emerged) = (BVec3::FALSE, None);
+        let (mut departing, mut emerged, mut airborne) = (BVec3::FALSE, None, false);
         for &(side, boundary) in &self.sides {
             let spacing = self.mesh.spacing[side.axis];
             let margin = MARGIN * spacing;
@@ -159,6 +163,7 @@ impl OpenSides {
                 (range.0.min(x), range.1.max(x))
             });
             if boundary == Boundary::FreeSurface {
+                airborne = lowest > MARGIN * self.mesh.spacing.max_element();
                 if highest > 0.0 {
                     let (subvolumes, direction) =
                         (&self.subvolumes[index], (side.axis, side.outward()));
@@ -175,6 +180,7 @@ impl OpenSides {
         }
         match emerged {
             _ if departing.any() => Crossing::Departing(departing, emerged),
+            Some(part) if airborne => Crossing::Airborne(part),
             Some(part) => Crossing::Emerged(part),
             None => Crossing::Inside,
         }
@@ -281,8 +287,9 @@ impl RigidBodySystem {
         DVec3::from_slice(&self.impulse.at(grain.rigid_velocity())[..3])
     }
 
-    /// Assembles the equations of a grain that leaves the box under the `applied` load and the
-    /// hydrodynamic load of the last step, `last_load`, over `dt` [s], without contact.
+    /// Assembles the equations of a grain that leaves the box or is airborne under the `applied`
+    /// load and the hydrodynamic load of the last step, `last_load`, over `dt` [s], without
+    /// contact.
     pub fn departing(
         grain: &Grain,
         previous: &PreviousStep,
@@ -333,7 +340,9 @@ impl Crossing {
     /// Part of the grain beyond a free surface.
     fn emerged_part(&self) -> Option<&EmergedPart> {
         match self {
-            Crossing::Emerged(part) | Crossing::Departing(_, Some(part)) => Some(part),
+            Crossing::Emerged(part)
+            | Crossing::Airborne(part)
+            | Crossing::Departing(_, Some(part)) => Some(part),
             _ => None,
         }
     }

@@ -82,7 +82,7 @@ pub struct RigidBodySystem {
     virtual_mass: VirtualMass,
     pub(super) impulse: Impulse,
     surface: Option<EmergedLoads>,
-    /// Load of a grain that leaves the box.
+    /// Load of a grain that leaves the box or is airborne.
     pub(super) last_load: Option<Load>,
 }
 

@@ -49,7 +49,9 @@ impl CoupledGrains {
         let each = self.updates.iter().zip(grains).zip(previous).zip(contact);
         let each = each.map(|(((update, grain), previous), contact)| {
             let leaves_contact = previous.has_pending_velocity() && contact.is_zero();
-            let added_density = if leaves_contact { 0.0 } else { added_density };
+            // No added mass takes up the impact of a grain that moves under a given load.
+            let is_alone = leaves_contact || update.system.last_load.is_some();
+            let added_density = if is_alone { 0.0 } else { added_density };
             (update.system).response(grain, previous, added_density, dt)
         });
         responses.extend(each);

@@ -198,7 +198,7 @@ impl<R: Real> CouplingContext<'_, R> {
         let impulse = sum_impulse(known, predictions, density, forced, motion, dt);
         let applied = self.input.applied[index];
         let surface = match self.input.crossings.get(index) {
-            Some(Crossing::Departing(..)) => {
+            Some(Crossing::Departing(..) | Crossing::Airborne(_)) => {
                 let loads = [applied, self.input.last_loads[index]];
                 return RigidBodySystem::departing(grain, previous, impulse, loads, dt);
             }

@@ -68,9 +68,13 @@ impl<'a> Start<'a> {
             if let Some(load) = crossing.lost_buoyancy(setup.gravity, fluid_density) {
                 data.applied[i] += load;
             }
-            if let Crossing::Departing(..) = crossing {
-                // Departing grains move under their last load: no added mass takes up a velocity.
+            if let Crossing::Departing(..) | Crossing::Airborne(_) = crossing {
+                // These grains move under their last load: no added mass takes up a velocity.
                 data.previous[i].pending_added_mass_velocity = RigidVelocity::default();
+            }
+            if let Crossing::Airborne(_) = crossing {
+                data.previous[i].added_mass_uptake = RigidVelocity::default();
+                data.loads[i] = Load::default();
             }
             if let Crossing::Left = crossing {
                 data.applied[i] = Load::default();

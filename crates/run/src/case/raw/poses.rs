@@ -22,7 +22,7 @@ pub struct RawPoses {
     pub time: Option<Located<Quantity<Time>>>,
     /// Takes velocities and angular velocities from the table; otherwise the grains start at rest.
     #[serde(default)]
-    pub velocities: bool,
+    pub velocities: Located<bool>,
     /// Moves all grains [m].
     #[serde(default)]
     pub offset: Located<Triple<Length>>,

@@ -151,6 +151,26 @@ pub(super) fn check_faces(
     check_periodic(check, grains, placements, enclosure);
 }
 
+/// Reports grains that reach a free surface at the start, where the grid cannot be refined.
+pub(super) fn check_refined(
+    check: &mut Checker,
+    grains: &[Grain],
+    placements: &[Placement],
+    enclosure: &Enclosure,
+    boundaries: &Boundaries,
+) {
+    let floats = |o: &Outside| boundaries.0[o.axis][o.side] == Boundary::FreeSurface;
+    for o in outside(grains, enclosure).iter().filter(|o| floats(o)).take(LISTED) {
+        let message = format!(
+            "grain {} reaches {} beyond the free surface, where the grid cannot be refined",
+            o.grain,
+            length(o.by)
+        );
+        let help = "start it below the surface, or leave out [domain] refinement";
+        check.fail(&placements[o.grain].span, message, help);
+    }
+}
+
 /// Reports grains outside the box along a periodic axis.
 fn check_periodic(
     check: &mut Checker,

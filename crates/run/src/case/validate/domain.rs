@@ -234,6 +234,7 @@ pub(super) fn boundaries(
         check_axis(check, faces, axis, mesh.cells[axis], dry);
     }
     mass_balance(check, spans, &result, mesh);
+    one_free_surface(check, spans, &result);
     (check.problems.len() == before).then_some(result)
 }
 
@@ -242,7 +243,7 @@ fn boundary(face: &Face, axis: usize, side: usize) -> Result<Boundary, (String, 
     let takes_velocity = matches!(face.kind, FaceKind::Wall | FaceKind::Inflow);
     if face.velocity.is_some() && !takes_velocity {
         return Err((
-            format!("a {} side has no velocity of its own", face.kind),
+            format!("a side of the kind \"{}\" has no velocity of its own", face.kind),
             "only wall and inflow take a velocity".into(),
         ));
     }
@@ -323,5 +324,15 @@ fn mass_balance(check: &mut Checker, spans: [[&Span; 2]; 3], boundaries: &Bounda
         let flux = quantity(1e3 * entering, "L/s");
         let message = format!("{flux} enter the box and nothing leaves it: no side is an outflow");
         check.fail(span, message, "make the opposite side an outflow");
+    }
+}
+
+/// Refuses a second free surface.
+fn one_free_surface(check: &mut Checker, spans: [[&Span; 2]; 3], boundaries: &Boundaries) {
+    let sides = boundaries.0.iter().flatten().zip(spans.into_iter().flatten());
+    let mut surfaces = sides.filter(|(boundary, _)| **boundary == Boundary::FreeSurface);
+    if let Some((_, second)) = surfaces.nth(1) {
+        let message = "a second free surface; the box can have one";
+        check.fail(second, message, "make this side a \"slip\" wall, or another of the conditions");
     }
 }

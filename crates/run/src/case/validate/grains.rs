@@ -264,7 +264,7 @@ pub(super) fn shape(
 }
 
 /// Returns the velocity at the start: the prescribed one, else the given one, else zero.
-fn initial<K: Kind>(
+pub(super) fn initial<K: Kind>(
     check: &mut Checker,
     law: &MotionLaw<K>,
     given: &Option<Located<Triple<K>>>,

@@ -132,6 +132,9 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
     };
     let state = [dry, grains.is_empty()];
     let refinement = domain::refinement(check, &raw.domain, &raw.coupling, &mesh, state);
+    if refinement > 1 {
+        arrangement::check_refined(check, &grains, &placements, &enclosure, &boundaries);
+    }
     let margin = domain::refinement_margin(check, &raw.domain, refinement, &mesh);
     let spacing = mesh.spacing / refinement.max(1) as f64;
     let step = plan::step(check, &mut raw.time, spacing, &grains, gravity, &prescription, dry);

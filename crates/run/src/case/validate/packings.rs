@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::check::{Checker, point_into_box};
-use super::grains::{Grains, not_too_light, shape};
+use super::grains::{Grains, initial, not_too_light, shape};
 use crate::case::close_packing::close_places;
 use crate::case::located::Located;
 use crate::case::packing::{Random, Region, orientation};
@@ -44,6 +44,8 @@ pub(super) fn packing(
     if raw.motion.velocity == MotionLaw::Free {
         not_too_light(check, &raw.density, fluid_density);
     }
+    let given = raw.velocity.span.is_some().then(|| raw.velocity.clone());
+    initial(check, &raw.motion.velocity, &given);
     let mut random = Random::seed_from_u64(raw.seed);
     let (mut written, bodies) = members(check, grains, raw, &mut random)?;
 

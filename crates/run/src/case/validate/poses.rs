@@ -15,7 +15,7 @@ use crate::case::raw::{MotionLaw, Orientation, Position, RawCase, RawGrain, RawP
 use crate::case::source::Source;
 use crate::number_format::{number_of_grains, quantity};
 use grainwake_formats::bounded_file::{SETTINGS, read_text};
-use grainwake_formats::poses::{Pose, Poses, read};
+use grainwake_formats::poses::{Origin, Pose, Poses, read};
 use grainwake_formats::{grains as grains_table, summary};
 use grainwake_solver::dem::{ContactLawKind, Enclosure};
 
@@ -59,8 +59,8 @@ pub(super) fn poses(
             grain.motion = motion.clone();
         }
         // A prescribed motion decides the velocity at the start.
-        let velocity = if raw.velocities { pose.velocity } else { DVec3::ZERO };
-        let spin = if raw.velocities { pose.angular_velocity } else { DVec3::ZERO };
+        let velocity = if raw.velocities.value { pose.velocity } else { DVec3::ZERO };
+        let spin = if raw.velocities.value { pose.angular_velocity } else { DVec3::ZERO };
         let free = grain.motion.velocity == MotionLaw::Free;
         grain.velocity = free.then(|| Triple::new(velocity).into());
         let free = grain.motion.angular_velocity == MotionLaw::Free;
@@ -122,7 +122,8 @@ fn of_run<'a>(
             return check.refuse(&run.span, message, help);
         }
     };
-    let table = read_table(check, raw, &folder.join(grains_table::FILE), &run.span)?;
+    let path = folder.join(grains_table::FILE);
+    let table = read_table(check, raw, &path, Origin::Run, &run.span)?;
     let finished = folder.join(summary::FILE).is_file();
     if !finished && raw.time.is_none() && table.rows_before.is_some_and(|n| n > table.poses.len()) {
         let time = quantity(table.time.unwrap_or(0.0), "s");
@@ -163,7 +164,8 @@ fn of_file<'a>(
         let help = "add files = [...] or shapes = [...], or name the run with run = ...";
         return check.refuse(&raw.span, "the grains of the table have no shape", help);
     }
-    let table = read_table(check, raw, &grains.library.path(&file.value), &file.span)?;
+    let path = grains.library.path(&file.value);
+    let table = read_table(check, raw, &path, Origin::Own, &file.span)?;
     let grain_of = move |check: &mut Checker, pose: &Pose| {
         let files = raw.files.len();
         let kind = pose.grain % (files + raw.shapes.len());
@@ -190,9 +192,20 @@ fn of_file<'a>(
     Some((table, Box::new(grain_of)))
 }
 
-fn read_table(check: &mut Checker, raw: &RawPoses, path: &Path, span: &Span) -> Option<Poses> {
+fn read_table(
+    check: &mut Checker,
+    raw: &RawPoses,
+    path: &Path,
+    origin: Origin,
+    span: &Span,
+) -> Option<Poses> {
     let at = raw.time.as_ref().map(|time| time.si);
-    match read(path, at) {
+    match read(path, origin, at) {
+        Ok(table) if raw.velocities.value && !table.has_velocities => {
+            let message = format!("{} has no velocities", path.display());
+            let help = "add the columns vx, vy, vz or wx, wy, wz, or leave out `velocities`";
+            check.refuse(&raw.velocities.span, message, help)
+        }
         Ok(table) => Some(table),
         Err(error) => {
             let span = raw.time.as_ref().map_or(span, |time| &time.span);
