@@ -52,7 +52,8 @@ fi
   full/bin/python -m mypy --config-file "$root/crates/python/pyproject.toml" -p grainwake
   full/bin/python -m mypy.stubtest grainwake._grainwake \
     --mypy-config-file "$root/crates/python/pyproject.toml" --allowlist "$root/.ci/stubtest.txt"
-  for study in dkt-morphology-ensemble dkt-morphology-members dkt-real-grains; do
+  for study in dkt-morphology-ensemble dkt-morphology-members dkt-morphology-repeated \
+    dkt-real-grains; do
     full/bin/python "$root/studies/second_route.py" "$root/results/$study" orientation cells
   done
 ) &
