@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::observation::{observations, unique, with_factor};
+use super::observation::{observations, with_factor};
 use super::statistics::spearman;
 use crate::measure::record::RunRecord;
+use crate::measure::unique;
 use crate::plan::claims::{Analysis, Condition, Correlations};
 
 /// Rank correlation of a quantity with a factor. The JSON names are stable.

@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::observation::{Member, members, other_levels, unique};
+use super::observation::{Member, members, other_levels};
 use super::statistics::{difference_interval, median, share_interval, sign_flip_p, signed_rank};
 use super::survival::{Duration, cumulative_incidence, log_rank, median_time};
-use crate::measure::mean;
 use crate::measure::record::RunRecord;
+use crate::measure::{mean, unique};
 use crate::plan::claims::{Analysis, Kissing};
 
 /// Results on the first contact.

@@ -56,17 +56,6 @@ pub fn other_levels(levels: &BTreeMap<String, String>, axis: &str) -> BTreeMap<S
     others
 }
 
-/// Returns the distinct names, in order of first appearance.
-pub fn unique<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for name in names {
-        if !out.contains(name) {
-            out.push(name.clone());
-        }
-    }
-    out
-}
-
 /// Returns a quantity of a run and whether it is right-censored.
 ///
 /// The times of events that did not occur are censored when a grain first lands or leaves the box,

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::record::RunRecord;
 use super::settling::GrainSettling;
-use crate::analysis::observation::unique;
+use super::unique;
 use crate::error::{At, StudyError, read_rows, write_file, write_json};
 use crate::format::rounded;
 use crate::plan::quantities::{FIRST_COLUMNS, LAST_COLUMNS, PAIR_QUANTITIES, SETTLING_QUANTITIES};

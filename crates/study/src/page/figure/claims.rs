@@ -9,8 +9,8 @@ use grainwake_plot::{Figure, text};
 
 use super::data::FigureData;
 use crate::analysis::claim_test::Effect;
-use crate::analysis::observation::unique;
 use crate::analysis::verdict::{Finding, Verdict};
+use crate::measure::unique;
 use crate::page::label::label;
 
 /// Width of the column of the claims [pt].

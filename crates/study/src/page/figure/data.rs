@@ -13,10 +13,10 @@ use super::line_style::{LineStyle, OUTSIDE};
 use crate::analysis::correlation::Correlation;
 use crate::analysis::factor_mean::FactorMean;
 use crate::analysis::kissing::KissingResults;
-use crate::analysis::observation::unique;
 use crate::analysis::verdict::Finding;
 use crate::measure::record::RunRecord;
 use crate::measure::trajectory::Trajectory;
+use crate::measure::unique;
 use crate::page::label::name_of;
 use crate::plan::{Plan, Run};
 

@@ -11,7 +11,7 @@ use super::data::FigureData;
 use super::legend::symbol_entry;
 use super::line_style::LineStyle;
 use crate::analysis::factor_mean::{FactorMean, KISSING_SHARE};
-use crate::analysis::observation::unique;
+use crate::measure::unique;
 use crate::page::label::label;
 
 const LEFT: f64 = 42.0;

@@ -9,7 +9,7 @@ use grainwake_plot::{Figure, letter, text};
 
 use super::data::FigureData;
 use crate::analysis::kissing::Level;
-use crate::analysis::observation::unique;
+use crate::measure::unique;
 
 const LEFT: f64 = 42.0;
 const GAP: f64 = 20.0;

@@ -7,7 +7,7 @@ use grainwake_plot::text;
 
 use super::data::FigureData;
 use super::line_style::{DASHES, LineStyle, MOST, OUTSIDE};
-use crate::analysis::observation::unique;
+use crate::measure::unique;
 use crate::plan::Run;
 
 /// Returns the entry of a legend with a symbol.

@@ -12,8 +12,9 @@ use grainwake_plot::{Figure, text};
 use super::data::FigureData;
 use super::legend::{LineStyles, axes};
 use super::misses::{self, STRIP};
-use crate::analysis::observation::{Observation, is_time, observations, other_levels, unique};
+use crate::analysis::observation::{Observation, is_time, observations, other_levels};
 use crate::format::missed;
+use crate::measure::unique;
 use crate::plan::Run;
 use crate::plan::quantities::SHAPE_FACTORS;
 
