@@ -36,11 +36,16 @@ def behind_sphere(m, a):
     return 1 - above / (2 * sinh(m * a) + m * sinh(2 * a))
 
 
-print("# Speed over that in unbounded fluid; written by series.py, which names the sources.")
-print("gap_over_radius,onto_wall,onto_fixed_sphere")
-for k in range(0, 49):
-    gap = 10 ** (-2.2 + k / 24)
-    wall = series(towards_wall, acosh(1 + gap))
-    alpha = acosh(1 + gap / 2)
-    pair = (series(towards_sphere, alpha) + series(behind_sphere, alpha)) / 2
-    print(f"{gap:.6f},{1 / wall:.6f},{1 / pair:.6f}")
+def main():
+    print("# Speed over that in unbounded fluid; written by series.py, which names the sources.")
+    print("gap_over_radius,onto_wall,onto_fixed_sphere")
+    for k in range(0, 49):
+        gap = 10 ** (-2.2 + k / 24)
+        wall = series(towards_wall, acosh(1 + gap))
+        alpha = acosh(1 + gap / 2)
+        pair = (series(towards_sphere, alpha) + series(behind_sphere, alpha)) / 2
+        print(f"{gap:.6f},{1 / wall:.6f},{1 / pair:.6f}")
+
+
+if __name__ == "__main__":
+    main()

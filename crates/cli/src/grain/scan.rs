@@ -146,7 +146,7 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
 /// Fraction of the surface cut from neighbours above which the roundness is doubtful.
 const MUCH_SHARED: f64 = 0.01;
 
-/// Smallest share of filled cavities in the volume of a grain that is told.
+/// Share of filled cavities in the volume of a grain from which on the output names the grain.
 const CAVITIES_TOLD: f64 = 1e-3;
 
 /// Describes what was changed on grains: specks removed, cavities filled, and labels rescued, by
