@@ -1070,8 +1070,10 @@ fn a_lubrication_gap_other_than_one_cell_of_the_finest_grid_is_warned_of() {
     {
         let found = of(gap, refinement);
         let cell = if refinement.is_empty() { "0.25 mm" } else { "0.125 mm" };
-        let words =
-            format!("if lubrication_gap is one cell, {cell}; that of {gap} is too {amount}");
+        let words = format!(
+            "a lubrication_gap of {gap} makes the lubrication force too {amount}: set [contact] \
+             lubrication_gap to one cell, {cell}"
+        );
         assert!(found.contains(&words), "{found}");
     }
     for (gap, refinement) in [("0.25 mm", ""), ("0.125 mm", refined), ("0 mm", "")] {

@@ -66,9 +66,9 @@ pub(super) fn film_off_the_grid(setup: &Setup) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "the lubrication force completes the film of the grid if lubrication_gap is one cell, {}; that of {} is too {amount}",
-        length(cell),
-        length(gap)
+        "a lubrication_gap of {} makes the lubrication force too {amount}: set [contact] lubrication_gap to one cell, {}",
+        length(gap),
+        length(cell)
     ))
 }
 
