@@ -21,9 +21,12 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     let &[nx, ny, nz] = &args.size[..] else {
         return Err(Exit::input("--size takes three numbers"));
     };
-    if [nx, ny, nz].iter().any(|n| !(16..=4096).contains(n)) || args.steps == 0 {
-        let message = "--size takes 16 to 4096 cells along each axis, --steps at least one step";
+    if let Some(n) = [nx, ny, nz].iter().find(|n| !(16..=4096).contains(*n)) {
+        let message = format!("--size takes 16 to 4096 cells along each axis, found {n}");
         return Err(Exit::input(message));
+    }
+    if args.steps == 0 {
+        return Err(Exit::input("--steps takes at least one step"));
     }
     let own = (args.case.as_ref()).map(|path| kind::case(path, &args.overrides)).transpose()?;
     if own.is_none() && !args.overrides.list().is_empty() {

@@ -318,6 +318,15 @@ fn boundaries_must_belong_together() {
         let boundaries = format!("cell_size = \"0.25 mm\"\nboundaries = {{ {faces} }}");
         problems(&PAIR.replace("cell_size = \"0.25 mm\"", &boundaries)).len()
     };
+    let all = |word: &str| {
+        let boundaries = format!("cell_size = \"0.25 mm\"\nboundaries = \"{word}\"");
+        PAIR.replace("cell_size = \"0.25 mm\"", &boundaries)
+    };
+    assert_eq!(good(&all("slip")).setup.boundaries.0, [[Boundary::Slip; 2]; 3]);
+    let (cell, key) = ("cell_size = \"0.25 mm\"", "domain.boundaries");
+    let with = |word: &str| format!("boundaries = \"{word}\"\n{cell}");
+    refused(cell, &with("free-surface"), key, &["second free surface"]);
+    refused(cell, &with("slippery"), key, &["slippery", "free-surface"]);
     let slip = "{ kind = \"slip\", velocity = [0, 0.1, 0] }";
     assert_eq!(count(&format!("x = {slip}")), 1, "one value for both sides");
     assert_eq!(count(&format!("x = [{slip}, {slip}]")), 2, "a value for each side");
@@ -1369,6 +1378,12 @@ region = { lower = [0, 0, "0.3 m"], upper = ["20 mm", "20 mm", "330 mm"] }
 "#,
     );
     assert_eq!(case.setup.grains.len(), 1);
+}
+
+#[test]
+fn a_line_of_probes_needs_a_length() {
+    let line = "[[probe]]\nline = { from = [0, 0, 0], to = [0, 0, 0], points = 4 }\n[time]";
+    refused("[time]", line, "probe.0.line.to", &["both ends are at one point", "`point`"]);
 }
 
 #[test]

@@ -403,6 +403,12 @@ fn bench_measures_time_memory_and_the_limit() {
         let message = String::from_utf8_lossy(&lacking.get_output().stderr).into_owned();
         assert!(message.contains("this processor has at most"), "{message}");
     }
+    for (option, found) in [("--size 8 24 48", "--size takes 16 to 4096"), ("--steps 0", "--steps")]
+    {
+        let refused = grainwake().arg("bench").args(option.split(' ')).assert().code(2);
+        let message = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(message.contains(found), "{message}");
+    }
     // Two by two by four places of eleven cells.
     let many =
         grainwake().args(["bench", "--size", "24", "24", "48", "--grains", "17"]).assert().code(2);

@@ -45,6 +45,9 @@ fn a_soft_contact_stops_and_names_the_stiffness_to_choose() {
         contains("a grain that falls through the box would overlap by 33 % of its diameter")
             .and(contains("(the run stops at 10 %): raise [contact] stiffness to")),
     );
+    let softest = ["--set", "contact.stiffness=1e-9"];
+    let deeper = grainwake().arg("check").arg(&case).args(softest).assert().success();
+    deeper.stdout(contains("would overlap by more than its diameter at impact"));
     let out = folder.path().join("soft");
     let run = |out: &Path, more: &[&str]| {
         let mut command = grainwake();

@@ -350,7 +350,8 @@ fn lubrication_brakes_the_approach_and_never_the_dry_contact() {
 
 #[test]
 fn lubrication_acts_at_a_wall_up_to_its_whole_range() {
-    // F = 6 pi mu R^2 v (1/h - 1/h_g), h_g = h + 0.35 (h0 - h).
+    // F = 6 pi mu R^2 v (1/h - 1/h_g), h_g = h + 0.35 (h0 - h). At a slip wall the film is that
+    // between the sphere and its mirror image: R*^2 is R^2 / 4, h twice the gap, v twice the speed.
     let (radius, viscosity, range, speed) = (1e-3, 0.1, 5e-4, 1e-3);
     let params = ContactParams {
         lubrication_gap: range,
@@ -358,22 +359,27 @@ fn lubrication_acts_at_a_wall_up_to_its_whole_range() {
         roughness: 1e-6,
         ..smooth(1e3)
     };
-    let force = |gap: f64| {
+    let force = |side: Side, gap: f64| {
+        let mut enclosure = floor();
+        enclosure.sides[2][0] = side;
         let mut grain = sphere(radius, 2500.0, 1000, DVec3::Z * (radius + gap));
         grain.rotation = MotionConstraint::Prescribed(DVec3::ZERO);
         grain.translation = MotionConstraint::Prescribed(-speed * DVec3::Z);
         let mut mean = [Load::default()];
-        ContactDynamics::new(params, floor()).advance(&mut [grain], &[], 1e-9, &mut mean);
+        ContactDynamics::new(params, enclosure).advance(&mut [grain], &[], 1e-9, &mut mean);
         mean[0].force.z
     };
-    for share in [0.1, 0.4, 0.6, 0.9] {
-        let gap = share * range;
-        let grid_film = gap + 0.35 * (range - gap);
-        let strength = 6.0 * std::f64::consts::PI * viscosity * radius * radius * speed;
-        let expected = strength * (1.0 / gap - 1.0 / grid_film);
-        assert!((force(gap) / expected - 1.0).abs() < 1e-3, "{share}: {}", force(gap) / expected);
+    let strength = 6.0 * std::f64::consts::PI * viscosity * radius * radius * speed;
+    for (side, factor, images) in [(Side::WALL, 1.0, 1.0), (Side::Frictionless, 0.5, 2.0)] {
+        for share in [0.1, 0.4, 0.6, 0.9] {
+            let film = share * range;
+            let grid_film = film + 0.35 * (range - film);
+            let expected = factor * strength * (1.0 / film - 1.0 / grid_film);
+            let ratio = force(side, film / images) / expected;
+            assert!((ratio - 1.0).abs() < 1e-3, "{side:?}, {share}: {ratio}");
+        }
+        assert_eq!(force(side, 1.1 * range / images), 0.0);
     }
-    assert_eq!(force(1.1 * range), 0.0);
 }
 
 #[test]

@@ -29,7 +29,7 @@ pub struct RawDomain {
     pub origin: Located<Triple<Length>>,
     /// Conditions on the six faces.
     #[serde(default)]
-    pub boundaries: RawBoundaries,
+    pub boundaries: Located<RawBoundaries>,
 }
 
 /// Edges of a cell [m]: one for all axes, or one for each axis.
@@ -55,8 +55,7 @@ impl Notation for CellSize {
 }
 
 /// Conditions along each axis; no-slip walls at rest by default.
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RawBoundaries {
     /// Faces normal to x.
     pub x: Located<AxisFaces>,
@@ -64,6 +63,35 @@ pub struct RawBoundaries {
     pub y: Located<AxisFaces>,
     /// Faces normal to z.
     pub z: Located<AxisFaces>,
+}
+
+/// Table of [`RawBoundaries`].
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct BoundariesTable {
+    /// Faces normal to x.
+    x: Located<AxisFaces>,
+    /// Faces normal to y.
+    y: Located<AxisFaces>,
+    /// Faces normal to z.
+    z: Located<AxisFaces>,
+}
+
+impl Notation for RawBoundaries {
+    const EXPECTED: &'static str = "a condition for all sides (\"wall\", \"slip\" or \
+        \"periodic\"), or { x = ..., y = ..., z = ... }";
+    type List = Unsupported;
+    type Table = BoundariesTable;
+    fn from_word(word: &str) -> Result<Self, String> {
+        let faces = || Face::from_word(word).map(|face| AxisFaces::both(face).into());
+        Ok(RawBoundaries { x: faces()?, y: faces()?, z: faces()? })
+    }
+    fn from_table(BoundariesTable { x, y, z }: BoundariesTable) -> Result<Self, String> {
+        Ok(RawBoundaries { x, y, z })
+    }
+    fn scalar_schemas(generator: &mut SchemaGenerator) -> Vec<Schema> {
+        vec![generator.subschema_for::<FaceKind>()]
+    }
 }
 
 /// Faces normal to one axis.
@@ -195,4 +223,4 @@ impl Serialize for Face {
     }
 }
 
-notations!(CellSize, AxisFaces, Face);
+notations!(CellSize, RawBoundaries, AxisFaces, Face);

@@ -116,8 +116,8 @@ pub struct RawContact {
     pub global_damping: Located<Quantity<Rate>>,
     /// Lubrication correction below this gap [m]; 0 turns it off.
     pub lubrication_gap: Located<Quantity<Length>>,
-    /// Height of the asperities: the lubrication film is never thinner [m]; three thousandths of
-    /// the smallest equal-volume radius where it is not given.
+    /// Height of the asperities: the lubrication film is never thinner [m]; a thousandth of the
+    /// smallest equal-volume diameter where it is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roughness: Option<Located<Quantity<Length>>>,
     /// Sub-steps per contact time.

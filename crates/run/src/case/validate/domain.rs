@@ -195,13 +195,12 @@ pub(super) fn refinement_margin(
     Some(margin.0)
 }
 
-/// Positions in the source of the conditions on the six faces.
-fn face_spans(raw: &RawBoundaries) -> [[&Span; 2]; 3] {
+/// Positions in the source of the conditions on the six faces: of the face, else of its axis, else
+/// of all conditions.
+fn face_spans(raw: &Located<RawBoundaries>) -> [[&Span; 2]; 3] {
     [&raw.x, &raw.y, &raw.z].map(|axis| {
-        [&axis.lower, &axis.upper].map(|face| match face.span {
-            Some(_) => &face.span,
-            None => &axis.span,
-        })
+        let axis_span = axis.span.as_ref().map_or(&raw.span, |_| &axis.span);
+        [&axis.lower, &axis.upper].map(|face| face.span.as_ref().map_or(axis_span, |_| &face.span))
     })
 }
 
@@ -231,7 +230,7 @@ pub(super) fn boundaries(
                 }
             }
         }
-        check_axis(check, faces, axis, mesh.cells[axis], dry);
+        check_axis(check, faces, &raw.boundaries.span, axis, mesh.cells[axis], dry);
     }
     mass_balance(check, spans, &result, mesh);
     one_free_surface(check, spans, &result);
@@ -276,10 +275,11 @@ fn boundary(face: &Face, axis: usize, side: usize) -> Result<Boundary, (String, 
 /// Sign of a velocity that enters the box through the lower and the upper face.
 const INWARD: [f64; 2] = [1.0, -1.0];
 
-/// Refuses combinations of the two faces of an axis.
+/// Refuses combinations of the two faces of an axis; `whole` is the position of all conditions.
 fn check_axis(
     check: &mut Checker,
     faces: &Located<AxisFaces>,
+    whole: &Span,
     axis: usize,
     cells: usize,
     dry: bool,
@@ -292,10 +292,11 @@ fn check_axis(
         check.fail(&faces.span, message, help);
     } else if cells == 1 && lower != FaceKind::Periodic && !dry {
         let message = format!("{name} has one cell, so it is flat, and a flat axis has no walls");
-        let help = format!("write {name} = \"periodic\", or give the axis more cells");
-        match faces.span {
-            Some(_) => check.fail(&faces.span, message, help),
-            None => check.fail_key(&format!("domain.boundaries.{name}"), message, help),
+        let key = format!("domain.boundaries.{name}");
+        let help = format!("set {key} to \"periodic\", or give the axis more cells");
+        match faces.span.as_ref().or(whole.as_ref()) {
+            Some(span) => check.fail(&Some(span.clone()), message, help),
+            None => check.fail_key(&key, message, help),
         }
     }
 }

@@ -232,7 +232,7 @@ pub(super) fn contact(
 
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
 /// falling through the box), or lies on it, overlaps by more than `fraction` of the smallest
-/// equivalent diameter.
+/// equivalent diameter, added mass left out.
 fn stiffness_for(
     fraction: f64,
     grains: &[Grain],

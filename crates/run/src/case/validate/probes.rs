@@ -104,6 +104,10 @@ fn points_of_line(check: &mut Checker, line: &Located<RawLine>, mesh: &Mesh) -> 
         return None;
     }
     let (from, to) = (from?, to?);
+    if from == to {
+        let message = "the line has no length: both ends are at one point";
+        return check.refuse(&line.to.span, message, "move one end, or give `point` instead");
+    }
     // The last point is exact.
     let part = |n: usize| n as f64 / (count - 1) as f64;
     Some((0..count).map(|n| from * (1.0 - part(n)) + to * part(n)).collect())

@@ -140,8 +140,11 @@ pub(super) fn deep_impacts(setup: &Setup) -> Option<String> {
         true => format!(" (the run stops at {:.0} %)", 100.0 * limit),
         false => String::new(),
     };
+    let depth = match overlap < 1.0 {
+        true => format!("{:.0} % of", 100.0 * overlap),
+        false => "more than".into(),
+    };
     Some(format!(
-        "a grain {speed} would overlap by {:.0} % of its diameter at impact{stops}: raise {remedy} for 1 %",
-        100.0 * overlap
+        "a grain {speed} would overlap by {depth} its diameter at impact{stops}: raise {remedy} for 1 %"
     ))
 }

@@ -1,6 +1,6 @@
 //! Contact forces (Eqs 9-18): contacts and their records, kept between sub-steps. `law.rs` and
-//! `hertz_mindlin.rs` have the force laws, `model.rs` the loads of a pair. At set-up,
-//! `parameters.rs` selects the law.
+//! `hertz_mindlin.rs` have the force laws, `model.rs` the loads of a pair, `film.rs` lubrication.
+//! At set-up, `parameters.rs` selects the law.
 //!
 //! A further force law implements `ContactLaw` in a file beside `hertz_mindlin.rs`. It needs a
 //! variant of [`ContactLawKind`], of which the compiler then names every `match` (in `crates/run`
@@ -9,16 +9,17 @@
 //!
 //! A cohesive law overrides `ContactLaw::normal_force`, which returns the pull as a negative force;
 //! the elastic force that it gets is at least zero. A force across a gap belongs beside the
-//! lubrication in `model.rs`: `ContactModel::range` makes pairs of this gap contacts, and
+//! lubrication in `film.rs`: `ContactModel::range` makes pairs of this gap contacts, and
 //! `substeps.rs` chooses the sub-steps.
 
+mod film;
 mod hertz_mindlin;
 mod law;
 mod model;
 mod parameters;
 
 pub(super) use law::{BodyProperties, PairProperties};
-pub(super) use model::{BodyState, ContactModel, PairKinematics, SubstepVelocity};
+pub(super) use model::{BodyState, ContactModel, Film, PairKinematics, SubstepVelocity};
 pub use parameters::{ContactLawKind, ContactParams};
 
 use glam::DVec3;

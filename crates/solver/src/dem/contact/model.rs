@@ -14,7 +14,6 @@
 //! A single point receives Eq. 9. Dashpot and friction are shared by the weights. Friction is an
 //! incremental spring with Coulomb's bound (Eqs 12-15).
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
@@ -28,9 +27,6 @@ use crate::math::{Load, RigidVelocity};
 /// Exponent p of the overlaps in the weights of a patch. A larger one brings D closer to the
 /// deepest overlap and makes a flat patch stiffer against tilting, which needs shorter sub-steps.
 const EXPONENT: i32 = 8;
-/// s between grains and at a wall (`docs/decisions/0030-lubrication.md`).
-const GRID_FILM: [f64; 2] = [0.07, 0.35];
-
 /// Effective overlap of a patch, and means over its points with the weights w_i.
 #[derive(Clone, Copy, Debug, Default)]
 struct PatchMean {
@@ -186,34 +182,6 @@ impl ContactModel {
         record.tangential_stiffness = at.tangential_stiffness;
         record.in_contact = true;
     }
-
-    /// Resistance 6 pi mu R*^2 / h [N s/m] of a film between the equal-volume spheres.
-    pub fn film_resistance(&self, pair: &PairProperties, film: f64) -> f64 {
-        6.0 * PI * self.params.lubrication_viscosity * pair.reduced_radius.powi(2) / film
-    }
-
-    /// Force of a film h, at least as thick as the asperities are high, less that of a film
-    /// h_g = h + s (h_0 - h), which the grid resolves.
-    fn lubrication(
-        &self,
-        closest: &ContactPoint,
-        properties: &PairProperties,
-        pair: &PairKinematics,
-    ) -> PairLoads {
-        let (params, range) = (&self.params, self.range());
-        let ContactPoint { overlap, lever_arm, normal, .. } = *closest;
-        let film = params.roughness.max(-overlap);
-        if film >= range {
-            return PairLoads::default();
-        }
-        let share = GRID_FILM[usize::from(pair.bodies[1].properties.radius.is_infinite())];
-        let grid_film = film + share * (range - film);
-        let [thin, resolved] = [film, grid_film].map(|h| self.film_resistance(properties, h));
-        let resistance = pair.stable_damping(thin - resolved, lever_arm, normal);
-        let approach = pair.relative_velocity(lever_arm, |v| v.end).dot(normal);
-        let [on_grain, on_partner] = pair.loads(-resistance * approach * normal, lever_arm);
-        PairLoads { overlap, on_grain, on_partner, lever_arm, normal, elastic_energy: 0.0 }
-    }
 }
 
 /// Updates the dashpot fraction and returns the part of the sub-step in contact [s].
@@ -270,6 +238,14 @@ impl BodyState {
     }
 }
 
+/// Surfaces between which a lubrication film lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::dem) enum Film {
+    BetweenGrains,
+    AtWall,
+    AtSlipWall,
+}
+
 /// Relative position and states of the two bodies of a pair, space frame.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::dem) struct PairKinematics {
@@ -277,6 +253,8 @@ pub(in crate::dem) struct PairKinematics {
     pub branch: DVec3,
     /// First grain and its partner.
     pub bodies: [BodyState; 2],
+    /// Surfaces of the lubrication film.
+    pub film: Film,
     /// Sub-step in which dashpots must be stable [s].
     pub stable_step: f64,
 }
@@ -284,7 +262,7 @@ pub(in crate::dem) struct PairKinematics {
 impl PairKinematics {
     /// Velocity of the first body relative to the second at a point (Eq. 12) [m/s]; `of` selects
     /// the middle or the end of the sub-step.
-    fn relative_velocity(
+    pub(super) fn relative_velocity(
         &self,
         lever_arm: DVec3,
         of: impl Fn(&SubstepVelocity) -> RigidVelocity,
@@ -294,7 +272,7 @@ impl PairKinematics {
     }
 
     /// Loads on both bodies of a force [N] on the first one at a point.
-    fn loads(&self, force: DVec3, lever_arm: DVec3) -> [Load; 2] {
+    pub(super) fn loads(&self, force: DVec3, lever_arm: DVec3) -> [Load; 2] {
         let on_partner = Load { force: -force, torque: -(lever_arm + self.branch).cross(force) };
         [Load { force, torque: lever_arm.cross(force) }, on_partner]
     }
@@ -302,7 +280,7 @@ impl PairKinematics {
     /// Limits the coefficient of a dashpot [N s/m] that acts along the unit vector `direction` at a
     /// point: within a sub-step, an explicit dashpot must not reverse the velocity of the point,
     /// which follows a force at the edge of a flat grain more easily than the centroid.
-    fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3) -> f64 {
+    pub(super) fn stable_damping(&self, damping: f64, lever_arm: DVec3, direction: DVec3) -> f64 {
         if damping == 0.0 {
             return 0.0;
         }

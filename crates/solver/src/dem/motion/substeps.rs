@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::ContactDynamics;
 use super::contact_body::ContactBody;
 use crate::dem::contact::{
-    BodyState, ContactParams, ContactRecord, PairKinematics, PairProperties, update_records,
+    BodyState, ContactParams, ContactRecord, Film, PairKinematics, PairProperties, update_records,
 };
 use crate::dem::enclosure::{PairKey, Partner, Side};
 use crate::dem::grain::{Grain, MotionConstraint};
@@ -241,22 +241,22 @@ impl ContactDynamics {
         }
         let params = &self.model.params;
         let (body, position) = (self.bodies_of(&record.key).0, |i: usize| grains[i].pose.position);
-        let (friction, other, branch) = match record.key.partner {
+        let (film, friction, other, branch) = match record.key.partner {
             Partner::Grain(j) => {
                 let image = IVec3::from(record.key.image).as_dvec3() * self.enclosure.period();
                 let branch = position(record.key.grain as usize) - (position(j) + image);
-                (params.friction, self.bodies[j].state, branch)
+                (Film::BetweenGrains, params.friction, self.bodies[j].state, branch)
             }
             Partner::Wall { axis, side } => {
-                let (friction, velocity) = match self.enclosure.sides[axis as usize][side as usize]
-                {
-                    Side::Wall { velocity } => (params.wall_friction, velocity),
-                    Side::Open | Side::Frictionless => (0.0, DVec3::ZERO),
+                let side = self.enclosure.sides[axis as usize][side as usize];
+                let (film, friction, velocity) = match side {
+                    Side::Wall { velocity } => (Film::AtWall, params.wall_friction, velocity),
+                    Side::Open | Side::Frictionless => (Film::AtSlipWall, 0.0, DVec3::ZERO),
                 };
-                (friction, BodyState::translating(self.model.wall, velocity), DVec3::ZERO)
+                (film, friction, BodyState::translating(self.model.wall, velocity), DVec3::ZERO)
             }
         };
-        let pair = PairKinematics { branch, bodies: [body.state, other], stable_step };
+        let pair = PairKinematics { branch, bodies: [body.state, other], film, stable_step };
         self.model.evaluate(record, friction, &pair, step);
         record.deepest_overlap = record.deepest_overlap.max(record.loads.overlap);
     }

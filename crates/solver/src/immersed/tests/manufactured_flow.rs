@@ -241,5 +241,6 @@ fn the_force_is_of_second_order() {
 #[test]
 #[ignore = "several minutes"]
 fn the_force_is_of_second_order_on_finer_grids() {
-    check_order(16, 24, 1.9);
+    // 1.87 for the layer of d/16 carried across the cells (decision 0028; 1.9 before it).
+    check_order(16, 24, 1.85);
 }
