@@ -45,7 +45,7 @@ impl ReadLimits {
     /// Returns limits for volumes that fit in the available memory at `per_voxel` [bytes]; the
     /// default if the available memory is unknown.
     pub fn of_this_machine(per_voxel: u64) -> ReadLimits {
-        ReadLimits::default().within(available_memory(), per_voxel)
+        ReadLimits::default().within(crate::available_memory(), per_voxel)
     }
 
     fn within(self, available: Option<u64>, per_voxel: u64) -> ReadLimits {
@@ -82,19 +82,6 @@ impl ReadLimits {
         }
         Ok(voxels)
     }
-}
-
-/// Returns the memory available without swapping [bytes], if the operating system reports it
-/// (Linux).
-pub fn available_memory() -> Option<u64> {
-    mem_available(&std::fs::read_to_string("/proc/meminfo").unwrap_or_default())
-}
-
-/// Parses the available memory [bytes] from the text of /proc/meminfo.
-fn mem_available(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kib.checked_mul(1024)
 }
 
 /// Name of a file and the SHA-256 of its content, for provenance, and its path, for messages.
@@ -159,10 +146,6 @@ mod tests {
 
     #[test]
     fn a_volume_has_to_fit_into_the_memory_there_is() {
-        let message = "MemTotal:       24000000 kB\nMemAvailable:    4000000 kB\nSwapFree: 0 kB\n";
-        assert_eq!(mem_available(message), Some(4_096_000_000));
-        assert_eq!(mem_available("MemTotal: 24000000 kB\n"), None);
-        assert_eq!(mem_available("MemAvailable: many kB\n"), None);
         let path = Path::new("a.npy");
         let read = |available, edge| {
             let limits = ReadLimits::default().within(available, 20);

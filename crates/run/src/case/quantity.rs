@@ -12,6 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::notation::{Notation, Unsupported, deserialize, refusal, schema};
 use super::suggest::nearest;
 use super::units::{Dimension, UnitError, known_symbols, parse_unit};
+use crate::number_format::quantity;
 
 /// Kind of physical quantity.
 pub trait Kind: Copy + Debug + Default + PartialEq + JsonSchema + 'static {
@@ -19,6 +20,8 @@ pub trait Kind: Copy + Debug + Default + PartialEq + JsonSchema + 'static {
     const DIMENSION: Dimension;
     /// SI unit, "m".
     const SI: &'static str;
+    /// Largest value that is accepted [SI]: beyond it products of quantities overflow.
+    const LARGEST: f64;
     /// Example with a unit, "2 mm".
     const EXAMPLE: &'static str;
     /// Accepted notations, completing "expected ...".
@@ -38,13 +41,14 @@ macro_rules! expected {
 }
 
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $kind:ident ($m:expr, $l:expr, $t:expr, $a:expr) $name:tt, $si:tt, $example:tt;)*) => {$(
+    ($($(#[$doc:meta])* $kind:ident ($m:expr, $l:expr, $t:expr, $a:expr) $name:tt, $si:tt, $largest:tt, $example:tt;)*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct $kind;
         impl Kind for $kind {
             const DIMENSION: Dimension = Dimension::new($m, $l, $t, $a);
             const SI: &'static str = $si;
+            const LARGEST: f64 = $largest;
             const EXAMPLE: &'static str = $example;
             const EXPECTED: &'static str = expected!("", $name, $si, $example);
             const EXPECTED_VECTOR: &'static str =
@@ -67,35 +71,35 @@ macro_rules! kinds {
 
 kinds! {
     /// Length [m].
-    Length(0, 1, 0, 0) "a length", "m", "2 mm";
+    Length(0, 1, 0, 0) "a length", "m", 1e9, "2 mm";
     /// Time [s].
-    Time(0, 0, 1, 0) "a time", "s", "5 ms";
+    Time(0, 0, 1, 0) "a time", "s", 1e12, "5 ms";
     /// Density [kg/m^3].
-    Density(1, -3, 0, 0) "a density", "kg/m3", "1500 kg/m3";
+    Density(1, -3, 0, 0) "a density", "kg/m3", 1e30, "1500 kg/m3";
     /// Dynamic viscosity [Pa s].
-    DynamicViscosity(1, -1, -1, 0) "a dynamic viscosity", "Pa s", "1 mPa s";
+    DynamicViscosity(1, -1, -1, 0) "a dynamic viscosity", "Pa s", 1e15, "1 mPa s";
     /// Kinematic viscosity [m^2/s].
-    KinematicViscosity(0, 2, -1, 0) "a kinematic viscosity", "m2/s", "1 cSt";
+    KinematicViscosity(0, 2, -1, 0) "a kinematic viscosity", "m2/s", 1e15, "1 cSt";
     /// Velocity [m/s].
-    Velocity(0, 1, -1, 0) "a velocity", "m/s", "10 mm/s";
+    Velocity(0, 1, -1, 0) "a velocity", "m/s", 1e6, "10 mm/s";
     /// Acceleration [m/s^2].
-    Acceleration(0, 1, -2, 0) "an acceleration", "m/s2", "9.81 m/s2";
+    Acceleration(0, 1, -2, 0) "an acceleration", "m/s2", 1e9, "9.81 m/s2";
     /// Angle [rad].
-    Angle(0, 0, 0, 1) "an angle", "rad", "45 deg";
+    Angle(0, 0, 0, 1) "an angle", "rad", 1e9, "45 deg";
     /// Angular velocity [rad/s].
-    AngularVelocity(0, 0, -1, 1) "an angular velocity", "rad/s", "90 deg/s";
+    AngularVelocity(0, 0, -1, 1) "an angular velocity", "rad/s", 1e9, "90 deg/s";
     /// Stiffness [N/m].
-    Stiffness(1, 0, -2, 0) "a stiffness", "N/m", "100 N/m";
+    Stiffness(1, 0, -2, 0) "a stiffness", "N/m", 1e15, "100 N/m";
     /// Elastic modulus [Pa].
-    ElasticModulus(1, -1, -2, 0) "an elastic modulus", "Pa", "70 GPa";
+    ElasticModulus(1, -1, -2, 0) "an elastic modulus", "Pa", 1e15, "70 GPa";
     /// Force [N].
-    Force(1, 1, -2, 0) "a force", "N", "2 uN";
+    Force(1, 1, -2, 0) "a force", "N", 1e15, "2 uN";
     /// Torque [N m].
-    Torque(1, 2, -2, 0) "a torque", "N m", "2 nN m";
+    Torque(1, 2, -2, 0) "a torque", "N m", 1e15, "2 nN m";
     /// Rate [1/s].
-    Rate(0, 0, -1, 0) "a rate", "1/s", "2 1/s";
+    Rate(0, 0, -1, 0) "a rate", "1/s", 1e12, "2 1/s";
     /// Plain number.
-    Number(0, 0, 0, 0) "a plain number", "1", "0.5";
+    Number(0, 0, 0, 0) "a plain number", "1", 1e15, "0.5";
 }
 
 /// A value of kind `K`: a number, or a vector ([`Triple`]).
@@ -122,9 +126,7 @@ impl<K: Kind> Notation for Quantity<K> {
     type List = Unsupported;
     type Table = Unsupported;
     fn from_word(word: &str) -> Result<Self, String> {
-        let number = parse_quantity::<K>(word)?;
-        let refused = || format!("found {number}; expected {}", K::EXPECTED);
-        (number.is_finite().then(|| Quantity::new(number))).ok_or_else(refused)
+        parse_quantity::<K>(word).map(Quantity::new)
     }
     fn from_number(number: f64) -> Result<Self, String> {
         without_unit::<K>(number).map(Quantity::new)
@@ -186,9 +188,7 @@ impl<K: Kind> JsonSchema for Triple<K> {
 
 /// Accepts a number without a unit as a quantity of kind `K`; the error says what is accepted.
 pub fn without_unit<K: Kind>(number: f64) -> Result<f64, String> {
-    if !number.is_finite() {
-        return Err(format!("found {number}; expected {}", K::EXPECTED));
-    }
+    within_range::<K>(number)?;
     // Degrees without a unit are the commonest mistake.
     if K::SI == Angle::SI && number.abs() > TAU {
         return Err(format!(
@@ -244,7 +244,19 @@ pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
             K::EXPECTED
         ));
     }
-    Ok(scale.to_si(value))
+    within_range::<K>(scale.to_si(value))
+}
+
+/// Accepts a number [SI] up to the largest of its kind.
+fn within_range<K: Kind>(si: f64) -> Result<f64, String> {
+    if si.abs() <= K::LARGEST {
+        return Ok(si);
+    }
+    if !si.is_finite() {
+        return Err(format!("found {si}; expected {}", K::EXPECTED));
+    }
+    let [found, largest] = [si, K::LARGEST].map(|value| quantity(value, K::SI));
+    Err(format!("found {found}; accepted: up to {largest}"))
 }
 
 /// The unit with a space or slash in `symbol` that gives it the right dimension: "mPas" is "mPa s".
@@ -315,6 +327,16 @@ mod tests {
         // Turns per second and shares are no angles.
         assert!(parse_quantity::<AngularVelocity>("2 Hz").is_err());
         assert!(parse_quantity::<Angle>("50 %").is_err());
+    }
+
+    #[test]
+    fn numbers_that_no_case_has_are_refused() {
+        let refused = without_unit::<Velocity>(-1e150).unwrap_err();
+        assert_eq!(refused, "found -1e150 m/s; accepted: up to 1000000 m/s");
+        assert!(parse_quantity::<Velocity>("1e150 mm/s").is_err());
+        assert!(without_unit::<Length>(f64::NAN).unwrap_err().starts_with("found NaN; expected"));
+        assert!(parse_quantity::<Time>("1e400 s").unwrap_err().starts_with("found inf; expected"));
+        assert_eq!(parse_quantity::<Stiffness>("1e15 N/m"), Ok(1e15));
     }
 
     #[test]

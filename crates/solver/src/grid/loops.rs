@@ -57,13 +57,16 @@ pub fn for_slabs<const N: usize, R: Send>(
 
 /// Neighbouring columns through all planes of a list.
 pub struct Columns<'a, R> {
-    /// Positions of the columns in a plane.
-    pub range: Range<usize>,
+    range: Range<usize>,
     list: SharedRows<'a, R>,
     stride: usize,
 }
 
 impl<R> Columns<'_, R> {
+    /// Positions of the columns in a plane.
+    pub fn range(&self) -> Range<usize> {
+        self.range.clone()
+    }
     /// Entries of the columns in plane `k`, counted from 0.
     #[inline(always)]
     pub fn row(&mut self, k: usize) -> &mut [R] {

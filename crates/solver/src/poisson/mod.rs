@@ -127,8 +127,8 @@ impl<R: Real> Poisson<R> {
         let blocks = blocks.into_par_iter().chunks(blocks_of_slot);
         self.columns.par_iter_mut().zip(blocks).for_each(|(scratch, blocks)| {
             for mut columns in blocks {
-                let singular = columns.range.start == 0 && eigenvalues[0] == 0.0;
-                let lambda = &eigenvalues[columns.range.clone()];
+                let singular = columns.range().start == 0 && eigenvalues[0] == 0.0;
+                let lambda = &eigenvalues[columns.range()];
                 dispatch(Solve { system, columns: &mut columns, lambda, singular, scratch });
             }
         });
