@@ -89,6 +89,10 @@ pub enum SetupError {
     Inconsistent(String),
 }
 
+fn bounded(x: f64) -> bool {
+    x.is_finite() && x > 0.0
+}
+
 impl Setup {
     /// Set-up of a box with walls, without fluid, grains and gravity.
     pub fn new(mesh: Mesh) -> Setup {
@@ -225,61 +229,79 @@ impl Setup {
     /// # Errors
     /// [`SetupError::Inconsistent`] names the contradiction.
     pub fn validate(&self) -> Result<(), SetupError> {
-        let fail = |message: String| Err(SetupError::Inconsistent(message));
+        self.check_sides()
+            .and_then(|()| self.check_materials())
+            .and_then(|()| self.check_motions())
+            .and_then(|()| self.check_refinement())
+            .and_then(|()| self.check_step())
+            .map_err(SetupError::Inconsistent)
+    }
+
+    /// Checks the conditions on the sides of the box.
+    fn check_sides(&self) -> Result<(), String> {
         let fluid_enters = |side: &Boundary| matches!(side, Boundary::Inflow { .. });
         let sides = || self.boundaries.0.iter().flatten();
         for (axis, [lower, upper]) in self.boundaries.0.iter().enumerate() {
             let name = ["x", "y", "z"][axis];
             if (*lower == Boundary::Periodic) != (*upper == Boundary::Periodic) {
-                return fail(format!("axis {name} is periodic on one side only"));
+                return Err(format!("axis {name} is periodic on one side only"));
             }
             for side in [lower, upper] {
                 if let Boundary::Wall { velocity } = side
                     && (velocity[axis] != 0.0 || !velocity.is_finite())
                 {
-                    return fail(format!(
+                    return Err(format!(
                         "a wall normal to {name} has the velocity {velocity} m/s: it must be finite \
                          and in the plane of the wall"
                     ));
                 }
             }
             if self.fluid.is_some() && self.mesh.cells[axis] == 1 && *lower != Boundary::Periodic {
-                return fail(format!(
+                return Err(format!(
                     "axis {name} has one cell, so both its sides must be periodic"
                 ));
             }
         }
         if sides().any(fluid_enters) && !sides().any(|side| *side == Boundary::Outflow) {
-            return fail(
-                "fluid enters the box but no side lets it out: make one side an outflow".into(),
+            return Err(
+                "fluid enters the box but no side lets it out: make one side an outflow".into()
             );
         }
-        let bounded = |x: f64| x.is_finite() && x > 0.0;
+        if sides().filter(|side| **side == Boundary::FreeSurface).count() > 1 {
+            return Err("the box can have one free surface, not several".into());
+        }
+        Ok(())
+    }
+
+    /// Checks the grid and the constants of fluid, grains and contact.
+    fn check_materials(&self) -> Result<(), String> {
         if !self.mesh.spacing.to_array().into_iter().all(bounded) || self.mesh.cells.contains(&0) {
-            return fail(
-                "the grid needs at least one cell of positive size along each axis".into(),
-            );
+            return Err("the grid needs at least one cell of positive size along each axis".into());
         }
         let is_fluid = |p: FluidParams| bounded(p.density) && bounded(p.kinematic_viscosity);
         if !self.fluid.is_none_or(is_fluid) {
-            return fail("density and viscosity of the fluid must be positive".into());
+            return Err("density and viscosity of the fluid must be positive".into());
         }
         if let Some(i) = self.grains.iter().position(|grain| !bounded(grain.density)) {
-            return fail(format!("the density of grain {i} must be positive"));
+            return Err(format!("the density of grain {i} must be positive"));
         }
-        self.contact.validate().map_err(SetupError::Inconsistent)?;
+        self.contact.validate()?;
         if self.contact.law == ContactLawKind::HertzMindlin {
             for (i, grain) in self.grains.iter().enumerate() {
-                let in_words = |message| SetupError::Inconsistent(format!("grain {i}: {message}"));
-                grain.material.validate().map_err(in_words)?;
+                grain.material.validate().map_err(|message| format!("grain {i}: {message}"))?;
             }
         }
+        Ok(())
+    }
+
+    /// Checks how grains move.
+    fn check_motions(&self) -> Result<(), String> {
         let motions = &self.prescription.motions;
         let by_formula = |i| motions.iter().any(|m| m.grain == i && m.velocity.is_some());
         let is_free = |grain: &Grain| grain.translation == MotionConstraint::Free;
         let too_light = |(i, grain)| is_free(grain) && self.is_too_light(grain) && !by_formula(i);
         if let Some(i) = self.grains.iter().enumerate().position(too_light) {
-            return fail(format!(
+            return Err(format!(
                 "grain {i} is lighter than {LIGHTEST_FREE_GRAIN} times the fluid: free grains \
                  become unstable below it; prescribe its velocity, or take a denser grain"
             ));
@@ -288,40 +310,47 @@ impl Setup {
             && let Some(i) = self.grains.iter().position(|grain| grain.leaves_plane(axis))
         {
             let name = ["x", "y", "z"][axis];
-            return fail(format!(
+            return Err(format!(
                 "grain {i} starts out of the plane of the flow, which has one cell along {name}: \
                  its velocity along {name} and its angular velocity about the other axes must be \
                  0, or prescribed"
             ));
         }
-        if sides().filter(|side| **side == Boundary::FreeSurface).count() > 1 {
-            return fail("the box can have one free surface, not several".into());
+        if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {
+            let grain = motion.grain;
+            return Err(format!("a motion is given for grain {grain}, which is not there"));
         }
+        Ok(())
+    }
+
+    /// Checks the refined box.
+    fn check_refinement(&self) -> Result<(), String> {
         if self.refinement != 1 {
             let flat = (0..3).any(|axis| !self.mesh.is_resolved(axis));
             if self.refinement != 2 {
-                return fail(format!("the refinement must be 1 or 2, not {}", self.refinement));
+                return Err(format!("the refinement must be 1 or 2, not {}", self.refinement));
             } else if self.scheme == Scheme::Paper {
-                return fail("the paper's scheme works on one grid, without refinement".into());
+                return Err("the paper's scheme works on one grid, without refinement".into());
             } else if flat {
-                return fail("a box with a flat axis cannot be refined".into());
+                return Err("a box with a flat axis cannot be refined".into());
             }
         }
         if self.refinement_margin.is_some_and(|margin| !margin.to_array().into_iter().all(bounded))
         {
-            return fail("the margin of the refined box must be positive".into());
+            return Err("the margin of the refined box must be positive".into());
         }
-        if let Some(motion) = motions.iter().find(|m| m.grain >= self.grains.len()) {
-            let grain = motion.grain;
-            return fail(format!("a motion is given for grain {grain}, which is not there"));
-        }
+        Ok(())
+    }
+
+    /// Checks the time step.
+    fn check_step(&self) -> Result<(), String> {
         let step = match self.step {
             StepRule::Limits { max_step, .. } if self.fluid.is_none() => max_step,
             StepRule::Limits { max_step, .. } => max_step.min(f64::MAX),
             StepRule::Fixed(step) => step,
         };
         if !bounded(step) {
-            return fail("the time step must be positive and, without a fluid, finite".into());
+            return Err("the time step must be positive and, without a fluid, finite".into());
         }
         Ok(())
     }

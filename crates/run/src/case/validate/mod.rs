@@ -20,11 +20,13 @@ use self::grains::{Grains, Vertical};
 use super::error::{CaseError, Problem};
 use super::expect::Expectation;
 use super::located::Located;
-use super::raw::{RawCase, RawPlane};
+use super::raw::{RawCase, RawContact, RawPlane};
 use super::shapes::{Library, ShapeFile};
 use super::source::Source;
 use crate::RunPlan;
-use grainwake_solver::dem::Grain;
+use grainwake_solver::dem::{Enclosure, Grain};
+use grainwake_solver::flow::Boundaries;
+use grainwake_solver::grid::Mesh;
 use grainwake_solver::sim::{PrescribedMotion, Prescription, Setup};
 
 /// Validated parts of a case.
@@ -76,28 +78,7 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
         physics::formulas(check, fluid, &prescription, &mesh, raw.time.end.si);
     }
     let enclosure = Setup::enclosure_of(&mesh, &boundaries);
-    let before_packings = check.problems.len();
-    for raw_poses in &raw.poses {
-        let law = raw.contact.law.value;
-        let placed = poses::poses(check, &mut grains, raw_poses, &enclosure, law, fluid_density);
-        for grain in placed.into_iter().flatten() {
-            let placement = Placement::packed(check, &grain.span);
-            // The densities of a table are checked once for all its grains.
-            grains.add(check, &grain, placement, None);
-        }
-    }
-    for raw in &raw.packing {
-        let packed = packings::packing(check, &mut grains, raw, &enclosure, fluid_density);
-        for grain in packed.into_iter().flatten() {
-            let grain = Located::at(grain, raw.span.clone());
-            // The density of a packing is checked once for all its grains.
-            grains.add(check, &grain, Placement::packed(check, &raw.span), None);
-        }
-    }
-    // Checks of the arrangement need all grains.
-    if check.problems.len() > before_packings {
-        return None;
-    }
+    add_packed(check, &raw, &mut grains, &enclosure, fluid_density)?;
     let motions = grains.prescribed_motions();
     for PrescribedMotion { grain, velocity, angular_velocity } in &motions {
         let span = &grains.resolved[*grain].motion.span;
@@ -110,19 +91,8 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
     let mut grains = built.into_iter().collect::<Option<Vec<Grain>>>()?;
     prescription.motions = motions;
     prescription.prescribe_motion(&mut grains, 0.0);
-    let accepted = physics::accepted_overlap(check, &raw.contact);
-    if grains.iter().all(|grain| grain.pose.position.is_finite()) {
-        arrangement::check_faces(check, &grains, &placements, &enclosure, &boundaries, accepted);
-        overlaps::check_overlaps(check, &grains, &placements, &enclosure, accepted);
-    }
-    if let Some(normal) = (0..3).find(|axis| !dry && !mesh.is_resolved(*axis)) {
-        arrangement::check_plane(check, &grains, &placements, normal);
-    }
-    if dry && grains.is_empty() {
-        let message = "there is neither a fluid nor a grain";
-        check.fail_key("grain", message, "add [fluid] or [[grain]]");
-    }
-
+    let faces = (&mesh, &boundaries, &enclosure);
+    check_arrangement(check, &raw.contact, &grains, &placements, faces, dry);
     let material = materials::materials(check, &raw.contact, &resolved, &mut grains);
     let contact = if dry || fluid.is_some() {
         let raw = &mut raw.contact;
@@ -159,4 +129,57 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
     raw.poses = Vec::new();
     raw.output.planes = Some(plan.planes.iter().map(|p| RawPlane::from(p).into()).collect());
     Some(Validated { setup, plan, expect, shapes: library.into_files(), resolved: raw })
+}
+
+/// Adds the grains of tables of poses and of packings; `None` after a problem.
+fn add_packed(
+    check: &mut Checker,
+    raw: &RawCase,
+    grains: &mut Grains,
+    enclosure: &Enclosure,
+    fluid_density: Option<f64>,
+) -> Option<()> {
+    let before_packings = check.problems.len();
+    for raw_poses in &raw.poses {
+        let law = raw.contact.law.value;
+        let placed = poses::poses(check, grains, raw_poses, enclosure, law, fluid_density);
+        for grain in placed.into_iter().flatten() {
+            let placement = Placement::packed(check, &grain.span);
+            // The densities of a table are checked once for all its grains.
+            grains.add(check, &grain, placement, None);
+        }
+    }
+    for raw in &raw.packing {
+        let packed = packings::packing(check, grains, raw, enclosure, fluid_density);
+        for grain in packed.into_iter().flatten() {
+            let grain = Located::at(grain, raw.span.clone());
+            // The density of a packing is checked once for all its grains.
+            grains.add(check, &grain, Placement::packed(check, &raw.span), None);
+        }
+    }
+    // Checks of the arrangement need all grains.
+    (check.problems.len() == before_packings).then_some(())
+}
+
+/// Checks where the grains lie: in the box, apart from each other, in the plane of a flat box.
+fn check_arrangement(
+    check: &mut Checker,
+    contact: &RawContact,
+    grains: &[Grain],
+    placements: &[Placement],
+    (mesh, boundaries, enclosure): (&Mesh, &Boundaries, &Enclosure),
+    dry: bool,
+) {
+    let accepted = physics::accepted_overlap(check, contact);
+    if grains.iter().all(|grain| grain.pose.position.is_finite()) {
+        arrangement::check_faces(check, grains, placements, enclosure, boundaries, accepted);
+        overlaps::check_overlaps(check, grains, placements, enclosure, accepted);
+    }
+    if let Some(normal) = (0..3).find(|axis| !dry && !mesh.is_resolved(*axis)) {
+        arrangement::check_plane(check, grains, placements, normal);
+    }
+    if dry && grains.is_empty() {
+        let message = "there is neither a fluid nor a grain";
+        check.fail_key("grain", message, "add [fluid] or [[grain]]");
+    }
 }

@@ -143,27 +143,72 @@ pub(super) fn contact(
     let friction = check.not_negative(&raw.friction);
     let restitution = restitution(check, &raw.restitution);
     let global_damping = check.not_negative(&raw.global_damping);
-    let lubrication_gap = check.not_negative(&raw.lubrication_gap);
-    let roughness = match &raw.roughness {
-        Some(given) => check.positive(given, "the roughness"),
-        None => Some(ROUGHNESS * smallest_diameter(grains)),
-    };
+    let lubrication = lubrication(check, raw, grains, fluid.is_some());
     let substeps = check.within(&raw.substeps_per_contact, 5.0, 1e6);
     if let Some(limit) = &raw.overlap_limit {
         check.within(limit, 1e-3, 0.5)?;
     }
     let overlap_limit = overlap_limit(raw);
+    let law = raw.law.value;
+    let for_overlap = |overlap| stiffness_for(overlap, grains, fluid, gravity, mesh);
+    let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
+        (Some(k), Some(_)) => {
+            let message = "both stiffness and maximum_overlap are given";
+            check.refuse(&k.span, message, "keep one of them")
+        }
+        (Some(k), None) => check.positive(k, "the stiffness"),
+        (None, Some(overlap)) => check.within(overlap, 1e-6, 0.2).map(for_overlap),
+        (None, None) if law == ContactLawKind::Linear => Some(for_overlap(MAXIMUM_OVERLAP)),
+        (None, None) => Some(defaults.normal_stiffness),
+    };
+    if check.problems.len() > before {
+        return None;
+    }
+    let [lubrication_gap, roughness] = lubrication?;
+    let params = ContactParams {
+        law,
+        normal_stiffness: stiffness?,
+        tangential_ratio: tangential_ratio?,
+        friction: friction?,
+        wall_friction: wall_friction?,
+        restitution: restitution?,
+        tangential_damping: tangential_damping?,
+        wall_material: wall_material?,
+        global_damping: global_damping?,
+        lubrication_gap,
+        lubrication_viscosity: fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity),
+        roughness,
+        added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
+        substeps_per_contact: substeps?,
+        overlap_limit,
+    };
+    write_resolved(raw, &params);
+    Some(params)
+}
+
+/// Returns the lubrication gap and the roughness [m].
+fn lubrication(
+    check: &mut Checker,
+    raw: &RawContact,
+    grains: &[Grain],
+    has_fluid: bool,
+) -> Option<[f64; 2]> {
+    let diameter = smallest_diameter(grains);
+    let lubrication_gap = check.not_negative(&raw.lubrication_gap);
+    let roughness = match &raw.roughness {
+        Some(given) => check.positive(given, "the roughness"),
+        None => Some(ROUGHNESS * diameter),
+    };
     if let Some(given) = raw.roughness.as_ref().filter(|_| lubrication_gap == Some(0.0)) {
         let message = "a roughness needs a lubrication gap";
         check.fail(&given.span, message, "add lubrication_gap, or remove roughness");
     }
-    if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && fluid.is_none()) {
+    if let Some(gap) = lubrication_gap.filter(|gap| *gap > 0.0 && !has_fluid) {
         let message = format!("a lubrication gap of {} needs a fluid", length(gap));
         let help = "add [fluid] or set lubrication_gap = 0";
         check.fail(&raw.lubrication_gap.span, message, help);
     }
     // A missing unit makes these lengths a thousand times too large.
-    let diameter = smallest_diameter(grains);
     let lengths = [("a lubrication gap", Some(&raw.lubrication_gap))];
     for (what, given) in lengths.into_iter().chain([("a roughness", raw.roughness.as_ref())]) {
         if let Some(given) = given.filter(|given| given.si > diameter) {
@@ -184,50 +229,22 @@ pub(super) fn contact(
                     roughness smaller, or set lubrication_gap = 0";
         check.fail(&raw.lubrication_gap.span, message, help);
     }
-    let law = raw.law.value;
-    let for_overlap = |overlap| stiffness_for(overlap, grains, fluid, gravity, mesh);
-    let stiffness = match (&raw.stiffness, &raw.maximum_overlap) {
-        (Some(k), Some(_)) => {
-            let message = "both stiffness and maximum_overlap are given";
-            check.refuse(&k.span, message, "keep one of them")
-        }
-        (Some(k), None) => check.positive(k, "the stiffness"),
-        (None, Some(overlap)) => check.within(overlap, 1e-6, 0.2).map(for_overlap),
-        (None, None) if law == ContactLawKind::Linear => Some(for_overlap(MAXIMUM_OVERLAP)),
-        (None, None) => Some(defaults.normal_stiffness),
-    };
-    if check.problems.len() > before {
-        return None;
-    }
-    let params = ContactParams {
-        law,
-        normal_stiffness: stiffness?,
-        tangential_ratio: tangential_ratio?,
-        friction: friction?,
-        wall_friction: wall_friction?,
-        restitution: restitution?,
-        tangential_damping: tangential_damping?,
-        wall_material: wall_material?,
-        global_damping: global_damping?,
-        lubrication_gap: lubrication_gap?,
-        lubrication_viscosity: fluid.map_or(0.0, |f| f.density * f.kinematic_viscosity),
-        roughness: roughness?,
-        added_density: fluid.map_or(0.0, |f| ADDED_MASS * f.density),
-        substeps_per_contact: substeps?,
-        overlap_limit,
-    };
+    Some([lubrication_gap?, roughness?])
+}
+
+/// Writes the values that the case does not give, for the resolved case.
+fn write_resolved(raw: &mut RawContact, params: &ContactParams) {
     raw.maximum_overlap = None;
     raw.overlap_limit = Some(Quantity::new(params.overlap_limit).into());
     if params.lubrication_gap > 0.0 && params.roughness.is_finite() {
         raw.roughness = Some(Quantity::new(params.roughness).into());
     }
-    if law == ContactLawKind::Linear {
+    if params.law == ContactLawKind::Linear {
         raw.stiffness = Some(Quantity::new(params.normal_stiffness).into());
         raw.tangential_ratio = Some(Quantity::new(params.tangential_ratio).into());
         raw.tangential_damping = Some(Quantity::new(params.tangential_damping).into());
     }
     raw.wall_friction = Some(Quantity::new(params.wall_friction).into());
-    Some(params)
 }
 
 /// Stiffness [N/m] for which no grain that meets a wall at 1.5 times its settling speed (dry: after
