@@ -71,11 +71,8 @@ pub(super) fn header(path: &Path, bytes: &[u8], limits: &ReadLimits) -> Result<A
     let header = Header::parse(header)
         .ok_or_else(|| malformed("the header lacks a readable descr, fortran_order or shape"))?;
     let [nz, ny, nx] = header.shape[..] else {
-        let reason = format!(
-            "the array has {} dimensions {:?}; a volume has 3, indexed [z][y][x]",
-            header.shape.len(),
-            header.shape
-        );
+        let reason =
+            format!("an array of the shape {:?}; a volume has three axes, [z][y][x]", header.shape);
         return Err(ShapeError::unsupported(path, reason));
     };
     count(path, [nx, ny, nz], limits)?;
