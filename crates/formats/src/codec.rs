@@ -1,5 +1,9 @@
 //! Binary encoding of `.grain` files and checkpoints: little-endian numbers without padding,
 //! byte strings with their length in front. Numbers are stored exactly.
+//!
+//! Every writing function fails if the writer fails. Every reading function fails if the reader
+//! fails, at an early end, and for a value that is no encoding of its type.
+#![allow(clippy::missing_errors_doc, reason = "stated once above")]
 
 use std::io::{self, Read, Write};
 

@@ -73,6 +73,9 @@ impl Shape {
     /// Samples the distance on a grid that exceeds the bounding box by `margin` [m]. The grid has
     /// the spacing `spacing` [m], or the shape's own samples unless those are finer by more than a
     /// tenth.
+    ///
+    /// # Errors
+    /// The grid needs more samples than single precision can index.
     pub fn distances(&self, spacing: f64, margin: f64) -> Result<SampledField> {
         match &self.field {
             Field::Sampled(own) if own.spacing() >= 0.9 * spacing => {
@@ -183,6 +186,9 @@ impl Shape {
     }
 
     /// Returns the shape scaled by `factor`.
+    ///
+    /// # Errors
+    /// A factor that is not positive, or gives a size that no grain has.
     pub fn scaled(&self, factor: f64) -> Result<Shape> {
         positive("factor", factor)?;
         check_length("bounding radius of the scaled shape", self.bounding_radius * factor)?;
@@ -211,6 +217,9 @@ impl Shape {
     }
 
     /// Returns the shape scaled to the equivalent diameter `diameter` [m].
+    ///
+    /// # Errors
+    /// A diameter that no grain has.
     pub fn scaled_to_equivalent_diameter(&self, diameter: f64) -> Result<Shape> {
         check_length("equivalent diameter", diameter)?;
         self.scaled(diameter / self.equivalent_diameter())

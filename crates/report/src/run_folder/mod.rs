@@ -227,11 +227,17 @@ impl RunFolder {
     }
 
     /// Reads a slice.
+    ///
+    /// # Errors
+    /// The file cannot be read as an image; the message names it.
     pub fn slice(&self, frame: &FrameFile) -> Result<Image, String> {
         read_image(&frame.file)
     }
 
     /// Reads a surface.
+    ///
+    /// # Errors
+    /// The file cannot be read as a surface; the message names it.
     pub fn surface(&self, frame: &FrameFile) -> Result<Surface, String> {
         vtp::read(&frame.file)
     }

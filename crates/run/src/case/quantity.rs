@@ -186,7 +186,11 @@ impl<K: Kind> JsonSchema for Triple<K> {
     }
 }
 
-/// Accepts a number without a unit as a quantity of kind `K`; the error says what is accepted.
+/// Accepts a number without a unit as a quantity of kind `K`.
+///
+/// # Errors
+/// The number is beyond the largest of its kind, not finite, or an angle of more than a turn; the
+/// message says what is accepted.
 pub fn without_unit<K: Kind>(number: f64) -> Result<f64, String> {
     within_range::<K>(number)?;
     // Degrees without a unit are the commonest mistake.
@@ -199,7 +203,11 @@ pub fn without_unit<K: Kind>(number: f64) -> Result<f64, String> {
     Ok(number)
 }
 
-/// Reads "2 mm" as a quantity of kind `K` in SI units; the error says what is accepted.
+/// Reads "2 mm" as a quantity of kind `K` in SI units.
+///
+/// # Errors
+/// The text is no number with a unit of the kind, or beyond the largest of its kind; the message
+/// says what is accepted.
 pub fn parse_quantity<K: Kind>(text: &str) -> Result<f64, String> {
     let trimmed = text.trim();
     let end = number_end(trimmed);

@@ -9,6 +9,9 @@ use crate::{Shape, ShapeOptions};
 use glam::DVec3;
 
 /// Builds an ellipsoid with the given semi-axes [m], in any order.
+///
+/// # Errors
+/// A length that is no size of a grain, or options out of their range; the message names it.
 pub fn ellipsoid(a: f64, b: f64, c: f64, options: &ShapeOptions) -> Result<Shape> {
     let [a, b, c] = sorted(["a", "b", "c"], [a, b, c])?;
     let axes = DVec3::new(a, b, c);

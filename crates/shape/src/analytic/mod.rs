@@ -17,6 +17,9 @@ use crate::{Shape, ShapeOptions};
 const SPHERE_NODES: usize = 1257;
 
 /// Builds a sphere of `radius` [m].
+///
+/// # Errors
+/// A length that is no size of a grain, or options out of their range; the message names it.
 pub fn sphere(radius: f64, options: &ShapeOptions) -> Result<Shape> {
     check_length("radius", radius)?;
     let nodes = options.nodes.unwrap_or(SPHERE_NODES);

@@ -13,6 +13,10 @@ use std::f64::consts::PI;
 
 /// Builds a box with the given full edge lengths [m], in any order. Edges and corners are rounded
 /// to `radius` [m] (0 for a sharp box); rounding keeps the outer dimensions.
+///
+/// # Errors
+/// A length that is no size of a grain, a radius above half of the shortest edge, or options out of
+/// their range; the message names it.
 pub fn rounded_box(
     length: f64,
     width: f64,
@@ -56,6 +60,9 @@ pub fn rounded_box(
 
 /// Builds a circular cylinder of `radius` and `height` [m]. Its axis is x for a rod and z for a
 /// disc (height below sqrt(3) radii), following the order of the principal moments.
+///
+/// # Errors
+/// A length that is no size of a grain, or options out of their range; the message names it.
 pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
     check_length("radius", radius)?;
     check_length("height", height)?;
@@ -85,6 +92,9 @@ pub fn cylinder(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shap
 
 /// Builds a cylinder of `radius` and `height` [m] along x with a hemisphere at either end (total
 /// length `height` + 2 `radius`).
+///
+/// # Errors
+/// A length that is no size of a grain, or options out of their range; the message names it.
 pub fn capsule(radius: f64, height: f64, options: &ShapeOptions) -> Result<Shape> {
     check_length("radius", radius)?;
     check_length("height", height)?;
@@ -115,6 +125,9 @@ const FACETS: usize = 72;
 /// with semi-axes a, b, c [m]. Exponents e1 = e2 = 1 give the ellipsoid, small ones approach a box,
 /// and 2 gives an octahedron. Distances refer to a fine mesh with its vertices on the exact
 /// surface.
+///
+/// # Errors
+/// A length or an exponent out of its range, or options out of theirs; the message names it.
 pub fn superquadric(
     semi_axes: [f64; 3],
     e1: f64,

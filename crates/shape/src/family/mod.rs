@@ -69,6 +69,9 @@ pub fn family_options() -> ShapeOptions {
 const ATTEMPTS: u64 = 50;
 
 /// Generates one grain. Equal targets and seeds give equal grains.
+///
+/// # Errors
+/// A target out of its range, or one that no attempt from this seed reaches.
 pub fn family_grain(target: &FamilyTarget, seed: u64, options: &ShapeOptions) -> Result<Shape> {
     target.check()?;
     let cube = target.sphericity.powi(3);

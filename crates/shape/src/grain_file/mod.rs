@@ -28,12 +28,19 @@ const LARGEST: u64 = 1 << 30;
 
 impl Shape {
     /// Writes the shape to `path` atomically: to a temporary file in the same folder, then renamed.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         write_atomically(path, true, |out| out.write_all(&self.to_bytes()))
             .map_err(|e| ShapeError::io(path, e))
     }
 
     /// Reads a shape exactly as saved.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no undamaged `.grain` file of a version that this program
+    /// reads.
     pub fn load(path: &Path) -> Result<Shape> {
         let limits = crate::ReadLimits { file_bytes: LARGEST, ..Default::default() };
         let (bytes, _) = crate::limits::read_bytes(path, &limits)?;
@@ -60,6 +67,9 @@ impl Shape {
     }
 
     /// Decodes the content of a `.grain` file; `path` is used in messages only.
+    ///
+    /// # Errors
+    /// The bytes are no undamaged `.grain` file of a version that this program reads.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Shape> {
         let Some(mut rest) = bytes.strip_prefix(SIGNATURE) else {
             let reason = "it does not begin with the signature of a grain file";

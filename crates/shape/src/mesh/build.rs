@@ -20,6 +20,10 @@ pub struct MeshOptions {
 
 /// Builds the shape of a closed mesh [m]. Exact mass properties define the principal frame, in
 /// which the distances to the triangles are sampled, exactly near the surface.
+///
+/// # Errors
+/// Options out of their range, a surface that is open or crosses itself, normals that point inwards
+/// without `flip`, a size that no grain has, or too few cells for the quality check.
 pub fn shape_from_mesh(
     mesh: &TriangleMesh,
     source: &SourceFile,

@@ -12,6 +12,10 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Reads STL, OBJ, PLY or spherical-harmonic coefficients (.anm), merges coincident vertices and
 /// checks that the surface is closed and consistently oriented. `unit` is the length [m] of the
 /// file's unit: 1e-3 for millimetres. Errors report positions in the file's own units.
+///
+/// # Errors
+/// The file cannot be read, exceeds the limits, has no format of the list, or its surface is not
+/// one closed surface.
 pub fn read_mesh(
     path: &Path,
     unit: f64,
@@ -42,6 +46,9 @@ pub fn read_mesh(
 
 /// Merges coincident vertices of a mesh in memory and checks it as [`read_mesh`] does. `unit` is
 /// the length [m] of its unit. The source has no name, and the hash of the coordinates and faces.
+///
+/// # Errors
+/// The unit is not positive, or the surface is not one closed surface.
 pub fn mesh_from_memory(mesh: &TriangleMesh, unit: f64) -> Result<(TriangleMesh, SourceFile)> {
     positive("unit", unit)?;
     let mut hash = Sha256::new();

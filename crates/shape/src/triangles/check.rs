@@ -14,6 +14,10 @@ const FLAT: f64 = 1e-10;
 impl TriangleMesh {
     /// Refuses any mesh except one closed, outward-facing surface. Errors report positions in the
     /// units of the mesh.
+    ///
+    /// # Errors
+    /// The first defect, with its place: no faces, a face without area or with a missing vertex, an
+    /// edge that does not join two faces of one orientation, or inward normals.
     pub fn check_closed(&self) -> Result<()> {
         self.neighbours().map(|_| ())
     }

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 impl TriangleMesh {
     /// Refuses a surface with intersecting faces. Touching faces are allowed, and pairs with a
     /// common edge are not tested. The error names the first pair in file order.
+    ///
+    /// # Errors
+    /// The first pair of faces that intersect.
     pub fn check_crossings(&self) -> Result<()> {
         let bvh = Bvh::new(&self.faces());
         let mut crossings: Vec<(u32, u32, DVec3)> = (0..self.triangles.len() as u32)

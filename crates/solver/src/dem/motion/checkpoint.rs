@@ -51,6 +51,9 @@ fn decode_grain(input: &mut Decoder, grains: usize) -> io::Result<usize> {
 
 impl ContactDynamics {
     /// Writes the exact contact history and contacts.
+    ///
+    /// # Errors
+    /// The writer fails.
     pub fn save(&self, writer: &mut dyn Write) -> io::Result<()> {
         let mut out = Encoder::new(writer);
         out.raw(&SIGNATURE)?;
