@@ -8,9 +8,9 @@ use comfy_table::Table;
 use grainwake_run::FailureKind;
 use grainwake_run::number_format::size;
 use grainwake_study::{
-    Analysis, Archive, MANIFEST, Options, Outcome, Plan, Run, RunRecord, RunState, Selection,
-    StudyError, execute, expected_cost, note_on_unmeasured, one_per_grid, records, run_state,
-    time_steps, write_tables,
+    Analysis, Archive, MANIFEST, Options, Outcome, Plan, RESTORE, Run, RunRecord, RunState,
+    Selection, StudyError, execute, expected_cost, note_on_unmeasured, one_per_grid, records,
+    run_state, time_steps, write_tables,
 };
 
 use crate::args::StudyArgs;
@@ -221,6 +221,10 @@ fn dry_run(
                 continue;
             }
             RunState::Stale(why) => format!("restart: {why}"),
+            RunState::Damaged(why) => {
+                lines.push(format!("{}: skip, {why}; {RESTORE}", run.name));
+                continue;
+            }
         };
         lines.push(format!("{}: {doing}", run.name));
         to_do.push(run);

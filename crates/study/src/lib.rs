@@ -40,4 +40,4 @@ pub use plan::selection::Selection;
 pub use plan::{MANIFEST, Plan, RUNS, Run};
 pub use run::state::{Archive, RunState, StateKind, run_state};
 pub use run::step_time::{StepTime, time_steps};
-pub use run::{Options, Outcome, StudyObserver, execute};
+pub use run::{Options, Outcome, RESTORE, StudyObserver, execute};

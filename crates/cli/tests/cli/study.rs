@@ -96,6 +96,32 @@ fn killed_studies_give_the_same_table() {
 }
 
 #[test]
+fn a_finished_run_with_a_damaged_case_is_a_failure_and_stays() {
+    let (folder, path) = study();
+    let out = folder.path().join("out");
+    let run = |more: &[&str]| {
+        let mut command = grainwake();
+        command.arg("study").arg(&path).arg("-o").arg(&out).args(["--only", "light"]);
+        command.args(["--quiet", "--set", "time.end=4 ms"]).args(more).assert()
+    };
+    run(&[]).success();
+    std::fs::write(out.join("runs/light/case.resolved.toml"), b"title = \"\xff\"\n").unwrap();
+    let before = crate::common::contents(&out.join("runs"));
+    run(&["--list"]).success().stdout(contains("light  damaged"));
+    run(&["--dry-run"]).success().stdout(
+        contains("light: skip, ")
+            .and(contains("case.resolved.toml cannot be read: line 1 is not a text in UTF-8"))
+            .and(contains("restore the file"))
+            .and(contains("0 of 1 to do")),
+    );
+    for more in [&[][..], &["--retry"]] {
+        let failed = run(more).code(2).stderr(contains("case.resolved.toml cannot be read"));
+        failed.stderr(contains("remove its folder and its row"));
+        assert!(before == crate::common::contents(&out.join("runs")), "nothing may change");
+    }
+}
+
+#[test]
 fn lists_and_dry_runs_write_nothing() {
     let (folder, path) = study();
     let out = folder.path().join("out");

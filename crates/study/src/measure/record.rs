@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
-use grainwake_formats::summary::Summary;
+use grainwake_formats::summary::{self, Summary};
 use grainwake_report::run_folder::RunFolder;
 use grainwake_run::provenance::Provenance;
 use rayon::prelude::*;
@@ -31,7 +31,8 @@ pub struct RunRecord {
     pub factors: Factors,
     /// State.
     pub state: StateKind,
-    /// Reason of a failed or stale run, or what is wrong with the files of a finished one.
+    /// Reason of a failed, stale or damaged run, or what is wrong with the files of a finished
+    /// one.
     pub remark: Option<String>,
     /// Hash of the case, the end condition and the program.
     pub id: String,
@@ -81,6 +82,7 @@ impl RunRecord {
         match state {
             RunState::Failed(why) => record.remark = Some(why),
             RunState::Stale(why) => record.remark = Some(why.into()),
+            RunState::Damaged(why) => record.remark = Some(why),
             RunState::Finished => record.measure(&folder),
             RunState::Missing | RunState::Unfinished => {}
         }
@@ -89,27 +91,35 @@ impl RunRecord {
 
     /// Fills in the measured values of a finished run.
     fn measure(&mut self, folder: &Path) {
-        if let Ok(summary) = Summary::read(folder) {
-            self.diameter_m = mean(summary.grains.iter().map(|g| g.equivalent_diameter_m));
-            self.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
-            self.steps = Some(summary.steps);
-            self.end_time_s = Some(summary.end_time_s);
-            self.wall_s = Some(summary.cost.wall_s);
-            self.max_divergence = Some(summary.max_divergence);
+        match Summary::read(folder) {
+            Ok(summary) => {
+                self.diameter_m = mean(summary.grains.iter().map(|g| g.equivalent_diameter_m));
+                self.kiss_time_s = summary.pair.as_ref().and_then(|p| p.kiss_time_s);
+                self.steps = Some(summary.steps);
+                self.end_time_s = Some(summary.end_time_s);
+                self.wall_s = Some(summary.cost.wall_s);
+                self.max_divergence = Some(summary.max_divergence);
+            }
+            Err(error) => {
+                let file = folder.join(summary::FILE);
+                self.remark = Some(format!("{} cannot be read: {error}", file.display()));
+            }
         }
         self.threads = Provenance::read(folder).and_then(|p| Some(p.sessions.last()?.threads));
         match RunFolder::open(folder) {
             Ok(run) => {
                 self.gravity_m_per_s2 = run.facts.gravity.map(|g| g.to_array());
                 self.periods_m = run.periods();
-                self.remark = run.short_tables().into_iter().next();
-                if self.remark.is_some() {
+                let short = run.short_tables().into_iter().next();
+                let incomplete = short.is_some();
+                self.remark = self.remark.take().or(short);
+                if incomplete {
                     return;
                 }
                 self.pair = PairMeasures::from_run(&run);
                 self.settling = SettlingMeasures::from_run(&run);
                 if self.pair.is_none() && self.settling.is_none() {
-                    self.remark = run.notes.first().cloned();
+                    self.remark = self.remark.take().or_else(|| run.notes.first().cloned());
                 }
             }
             Err(error) => self.remark = Some(error.to_string()),
@@ -182,7 +192,7 @@ pub fn note_on_unmeasured<'a>(records: impl IntoIterator<Item = &'a RunRecord>) 
 /// Reads the records of all runs of a study.
 ///
 /// A run without a folder keeps its values in `table.json`, so that run folders may be removed. So
-/// does a finished run whose files are damaged.
+/// does a finished run whose files are damaged; its remark names the damage.
 ///
 /// # Errors
 /// [`StudyError::Damaged`] for a damaged `table.json`.
@@ -190,7 +200,8 @@ pub fn records(plan: &Plan, study: &Path) -> Result<Vec<RunRecord>, StudyError> 
     let kept: Vec<RunRecord> = read_rows(&study.join(TABLE))?;
     let read = |run: &Run| {
         let record = RunRecord::read(run, study);
-        let unknown = record.state == StateKind::Missing || record.unmeasured();
+        let unknown =
+            matches!(record.state, StateKind::Missing | StateKind::Damaged) || record.unmeasured();
         let same = |old: &&RunRecord| {
             old.name == run.name && old.finished() && run.ids().any(|id| *id == old.id)
         };

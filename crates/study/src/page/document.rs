@@ -82,8 +82,8 @@ impl Content<'_> {
     /// Lists runs without results and omitted parts.
     fn omissions(&self) -> Vec<String> {
         let mut out = Vec::new();
-        use StateKind::{Failed, Missing, Stale, Unfinished};
-        for state in [Missing, Unfinished, Failed, Stale] {
+        use StateKind::{Damaged, Failed, Missing, Stale, Unfinished};
+        for state in [Missing, Unfinished, Failed, Stale, Damaged] {
             let runs = self.records.iter().filter(|r| r.state == state);
             let names: Vec<&str> = runs.map(|r| r.name.as_str()).collect();
             if let Some(first) = names.get(..LISTED).filter(|_| names.len() > 2 * LISTED) {
@@ -94,7 +94,8 @@ impl Content<'_> {
             }
         }
         // Files of a finished run may be damaged.
-        let ended = self.records.iter().filter(|r| r.state == Failed || r.finished());
+        let ended = |r: &&RunRecord| matches!(r.state, Failed | Damaged) || r.finished();
+        let ended = self.records.iter().filter(ended);
         let reason = |r: &RunRecord| Some(format!("{}: {}", r.name, r.remark.as_ref()?));
         out.extend(ended.filter_map(reason));
         out.extend(note_on_unmeasured(self.records));

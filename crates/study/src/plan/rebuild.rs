@@ -80,7 +80,9 @@ fn runs_in(folder: &Path) -> Result<Vec<Run>, StudyError> {
             continue;
         };
         let base = std::path::absolute(&resolved).unwrap_or(resolved);
-        let mut run = run_of_case(&name, &base, Vec::new(), &case);
+        let Ok(mut run) = run_of_case(&name, &base, Vec::new(), &case) else {
+            continue;
+        };
         // The hash of an earlier program may differ for the same case.
         run.case_sha256 = provenance.case_sha256;
         let member = name.rsplit_once("-m").and_then(|(model, n)| Some((model, n.parse().ok()?)));

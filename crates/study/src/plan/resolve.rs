@@ -68,7 +68,7 @@ fn runs_of(
             .map_err(|error| locate_in_study(study, model, error))
     };
     let case = load(&set)?;
-    let mut runs = vec![run(model, 0, set.clone(), &case)];
+    let mut runs = vec![run(model, 0, set.clone(), &case)?];
     let ensemble = study.ensemble.as_ref().filter(|e| e.models.contains(&index));
     if let Some(ensemble) = ensemble {
         for member in 1..ensemble.members {
@@ -76,15 +76,15 @@ fn runs_of(
             set.extend(member_overrides(study, model, ensemble, member, &case)?);
             let case = Case::load_sharing(&model.base, &set, shapes)
                 .map_err(|error| locate_in_ensemble(study, ensemble, model, member, error))?;
-            runs.push(run(model, member, set, &case));
+            runs.push(run(model, member, set, &case)?);
         }
     }
     Ok(runs)
 }
 
-fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
+fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Result<Run, StudyError> {
     let base = std::path::absolute(&model.base).unwrap_or_else(|_| model.base.clone());
-    let mut run = run_of_case(&model.name, &base, set, case);
+    let mut run = run_of_case(&model.name, &base, set, case)?;
     if member > 0 {
         run.name = format!("{}-m{member}", model.name);
     }
@@ -95,17 +95,26 @@ fn run(model: &Model, member: usize, set: Vec<String>, case: &Case) -> Run {
     for (name, value) in of_shape {
         run.factors.entry(name).or_insert(value);
     }
-    run
+    Ok(run)
 }
 
 /// Returns the run of a case, outside all axes.
-pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case) -> Run {
+///
+/// # Errors
+/// [`StudyError::Damaged`] if the end of the resolved case is not known.
+pub(super) fn run_of_case(
+    name: &str,
+    base: &Path,
+    set: Vec<String>,
+    case: &Case,
+) -> Result<Run, StudyError> {
     let estimate = case.estimate(1);
-    let ending = end_condition(&case.resolved);
+    let ending = end_condition(&case.resolved)
+        .map_err(|what| StudyError::Damaged { file: base.into(), what })?;
     let program = Provenance::new(&case.digest);
     let commit = program.commit.unwrap_or_default();
     let id = run_id(&program.case_sha256, &ending, &program.version, &commit);
-    Run {
+    Ok(Run {
         name: name.into(),
         model: name.into(),
         factors: shape_factors(case),
@@ -121,7 +130,7 @@ pub(super) fn run_of_case(name: &str, base: &Path, set: Vec<String>, case: &Case
         // JSON has no infinity.
         wall_s: estimate.wall_s.min(f64::MAX),
         ..Run::default()
-    }
+    })
 }
 
 /// Returns the hash of a case, its end condition and a program.
@@ -149,14 +158,21 @@ fn shape_factors(case: &Case) -> Factors {
 }
 
 /// Returns the end time and the stop condition of a resolved case on one line.
-pub(crate) fn end_condition(resolved: &str) -> String {
-    let table: toml::Table = resolved.parse().unwrap_or_default();
+///
+/// # Errors
+/// The line of a syntax error, or that there is no end time, which every resolved case has.
+pub(crate) fn end_condition(resolved: &str) -> Result<String, String> {
+    let table: toml::Table = resolved.parse().map_err(|error: toml::de::Error| {
+        let start = error.span().map_or(0, |span| span.start);
+        let before = resolved.as_bytes().iter().take(start);
+        let line = 1 + before.filter(|byte| **byte == b'\n').count();
+        let message: Vec<&str> = error.message().lines().collect();
+        format!("line {line}: {}", message.join(", "))
+    })?;
     let time = table.get("time").and_then(toml::Value::as_table);
-    let part = |name: &str| {
-        let value = time.and_then(|t| t.get(name));
-        value.map_or("-".into(), toml::Value::to_string)
-    };
-    format!("end {}, stop {}", part("end"), part("stop"))
+    let part = |name: &str| time?.get(name).map(toml::Value::to_string);
+    let end = part("end").ok_or("there is no `end` in [time]")?;
+    Ok(format!("end {end}, stop {}", part("stop").unwrap_or("-".into())))
 }
 
 /// Locates the problems of a member, whose start differs from that of the model, in the ensemble.

@@ -35,6 +35,10 @@ pub struct Options {
     pub command: Vec<String>,
 }
 
+/// Advice about [`RunState::Damaged`].
+pub const RESTORE: &str = "restore the file; to repeat the run, remove its folder and its row in \
+                           table.json";
+
 /// Result of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
@@ -72,7 +76,7 @@ pub trait StudyObserver: Sync {
 ///
 /// A run that fails or panics does not stop the others; a full disk does. Finished runs are not
 /// repeated, even if only their rows in `table.json` are left, and interrupted ones resume from
-/// their last checkpoints.
+/// their last checkpoints. A finished run with a damaged case is a failure and stays as it is.
 ///
 /// # Errors
 /// If threads cannot be started, or `table.json` is damaged.
@@ -156,6 +160,11 @@ impl Job<'_> {
             RunState::Failed(why) if !self.options.retry => {
                 let reason = format!("failed before: {why}");
                 return Ok(Outcome::Failed(reason, FailureKind::Computation));
+            }
+            // The results may be sound: only the user removes them.
+            RunState::Damaged(why) => {
+                let reason = format!("{why}; {RESTORE}");
+                return Ok(Outcome::Failed(reason, FailureKind::Input));
             }
             RunState::Missing => Existing::Refuse,
             RunState::Unfinished => Existing::Resume,

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use grainwake_formats::bounded_file::{SETTINGS, read_text};
 use grainwake_formats::summary;
 use grainwake_run::RESOLVED;
 use grainwake_run::provenance::Provenance;
@@ -24,6 +25,9 @@ pub enum RunState {
     Failed(String),
     /// The run folder belongs to another case or program, with the reason.
     Stale(&'static str),
+    /// The run reached its end, but the file that tells which end cannot be read; with the file
+    /// and the reason.
+    Damaged(String),
 }
 
 impl RunState {
@@ -35,6 +39,7 @@ impl RunState {
             RunState::Finished => StateKind::Finished,
             RunState::Failed(_) => StateKind::Failed,
             RunState::Stale(_) => StateKind::Stale,
+            RunState::Damaged(_) => StateKind::Damaged,
         }
     }
 }
@@ -54,6 +59,8 @@ pub enum StateKind {
     Failed,
     /// [`RunState::Stale`].
     Stale,
+    /// [`RunState::Damaged`].
+    Damaged,
 }
 
 grainwake_formats::display_as_serialized!(StateKind);
@@ -115,17 +122,27 @@ pub(crate) fn folder_state(run: &Run, study: &Path) -> RunState {
         return RunState::Stale("another version of the program produced it");
     }
     if finished {
-        let resolved = std::fs::read_to_string(folder.join(RESOLVED)).unwrap_or_default();
-        return if end_condition(&resolved) == run.ending {
-            RunState::Finished
-        } else {
-            RunState::Stale("its end time has changed")
+        return match ending_in(&folder) {
+            Ok(ending) if ending == run.ending => RunState::Finished,
+            Ok(_) => RunState::Stale("its end time has changed"),
+            Err(why) => RunState::Damaged(why),
         };
     }
     match std::fs::read_to_string(folder.join("failure.json")) {
         Ok(text) => RunState::Failed(failure_reason(&text)),
         Err(_) => RunState::Unfinished,
     }
+}
+
+/// Returns the end condition of the run in a folder.
+///
+/// # Errors
+/// The file and the reason why it is not known.
+fn ending_in(folder: &Path) -> Result<String, String> {
+    let file = folder.join(RESOLVED);
+    let text = read_text(&file, SETTINGS)
+        .map_err(|error| format!("{} cannot be read: {error}", file.display()))?;
+    end_condition(&text).map_err(|error| format!("{} is damaged: {error}", file.display()))
 }
 
 fn failure_reason(failure: &str) -> String {

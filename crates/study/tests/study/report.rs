@@ -19,7 +19,7 @@ fn synthetic_plan() -> Plan {
     let program =
         Provenance { version: "0.1.0".into(), commit: plan.commit.clone(), ..Provenance::new("") };
     for run in &mut plan.runs {
-        (run.case_sha256, run.ending) = ("00ff".into(), "end -, stop -".into());
+        (run.case_sha256, run.ending) = ("00ff".into(), "end 1.0, stop -".into());
         run.id = run.id_by(&program);
     }
     plan
@@ -62,9 +62,9 @@ fn stretch(from: &Path, to: &Path, factor: f64) {
         writeln!(log, "{event}").unwrap();
     }
     std::fs::write(to.join("events.jsonl"), log).unwrap();
-    for name in ["case.resolved.toml", "provenance.json"] {
-        std::fs::copy(from.join(name), to.join(name)).unwrap();
-    }
+    std::fs::copy(from.join("provenance.json"), to.join("provenance.json")).unwrap();
+    let resolved = read("case.resolved.toml") + "\n[time]\nend = 1.0\n";
+    std::fs::write(to.join("case.resolved.toml"), resolved).unwrap();
     let mut summary: serde_json::Value = serde_json::from_str(&read("summary.json")).unwrap();
     summary["end_time_s"] = (summary["end_time_s"].as_f64().unwrap() * factor).into();
     summary["max_cfl"] = 0.3.into();

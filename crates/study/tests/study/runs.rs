@@ -303,6 +303,91 @@ fn a_finished_run_with_damaged_files_keeps_its_values() {
     assert_eq!(records(&plan, &study).unwrap()[0].pair, before[0].pair);
 }
 
+/// Only the end of the run is unknown; its results may be sound.
+#[test]
+fn a_finished_run_with_a_damaged_case_is_reported_and_never_replaced() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0], &study, &options(1), &Quiet).unwrap();
+    let before = records(&plan, &study).unwrap();
+    let files = ["provenance.json", "grains.csv", "summary.json"];
+    let run_folder = plan.runs[0].folder(&study);
+    let results = || files.map(|name| std::fs::read(run_folder.join(name)).unwrap());
+    let (kept, resolved) = (results(), run_folder.join("case.resolved.toml"));
+    let sound = std::fs::read(&resolved).unwrap();
+    let text = String::from_utf8(sound.clone()).unwrap();
+    let mut byte = sound.clone();
+    *byte.last_mut().unwrap() = 0xff;
+    let no_end = text.lines().filter(|line| !line.starts_with("end = ")).collect::<Vec<_>>();
+    assert_eq!(no_end.len() + 1, text.lines().count());
+    let damages = [
+        (Some(byte), "not a text in UTF-8 (byte 0xff)"),
+        (Some(format!("x =\n{text}").into_bytes()), "is damaged: line 1: "),
+        (Some(no_end.join("\n").into_bytes()), "no `end` in [time]"),
+        (None, "cannot be read"),
+    ];
+    let retry = Options { retry: true, ..options(1) };
+    for in_table in [false, true] {
+        for (damaged, reason) in &damages {
+            match damaged {
+                Some(bytes) => std::fs::write(&resolved, bytes).unwrap(),
+                None => std::fs::remove_file(&resolved).unwrap(),
+            }
+            let named = |text: &str| text.contains("case.resolved.toml") && text.contains(reason);
+            let RunState::Damaged(why) = &states(&plan, &study)[0] else {
+                panic!("{:?}", states(&plan, &study)[0]);
+            };
+            assert!(named(why), "{why}");
+            let ended = execute(&plan.runs, &[0], &study, &retry, &Quiet).unwrap();
+            let Outcome::Failed(why, FailureKind::Input) = &ended[0].1 else {
+                panic!("{ended:?}");
+            };
+            assert!(named(why) && why.contains("remove its folder"), "{why}");
+            assert!(results() == kept, "nothing may change");
+            let row = &records(&plan, &study).unwrap()[0];
+            assert!(row.remark.as_deref().is_some_and(named), "{:?}", row.remark);
+            // Values that are known stay.
+            let values = in_table.then_some((StateKind::Finished, before[0].pair.clone()));
+            let expected = values.unwrap_or((StateKind::Damaged, None));
+            assert_eq!((row.state, row.pair.clone()), expected);
+            let listed = render(&study);
+            assert!(listed.is_ok());
+            let page = std::fs::read_to_string(study.join("report.html")).unwrap();
+            assert!(page.contains("case.resolved.toml cannot") || page.contains("is damaged"));
+        }
+        std::fs::write(&resolved, &sound).unwrap();
+        write_tables(&before, &study).unwrap();
+    }
+    let ended = execute(&plan.runs, &[0], &study, &retry, &Quiet).unwrap();
+    assert_eq!(ended[0].1, Outcome::AlreadyFinished);
+}
+
+#[test]
+fn a_summary_of_another_structure_is_remarked() {
+    let (folder, path) = folder(STUDY);
+    let plan = plan(&path).unwrap();
+    let study = folder.path().join("out");
+    plan.create_folder(&study).unwrap();
+    execute(&plan.runs, &[0], &study, &options(1), &Quiet).unwrap();
+    let before = records(&plan, &study).unwrap();
+    let file = plan.runs[0].folder(&study).join("summary.json");
+    let mut summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    summary["steps"] = "many".into();
+    std::fs::write(&file, summary.to_string()).unwrap();
+    let row = &records(&plan, &study).unwrap()[0];
+    let remark = row.remark.clone().unwrap();
+    assert!(remark.contains("summary.json cannot be read") && remark.contains("many"), "{remark}");
+    assert!(row.steps.is_none() && row.unmeasured());
+    assert_eq!(row.pair, before[0].pair, "the tables are sound");
+    // The row in the table has all values.
+    write_tables(&before, &study).unwrap();
+    let row = &records(&plan, &study).unwrap()[0];
+    assert_eq!((row.steps, row.remark.as_ref()), (before[0].steps, Some(&remark)));
+}
+
 #[test]
 fn a_study_continues_from_its_archive() {
     let (folder, path) = folder(STUDY);
