@@ -48,7 +48,8 @@ pub enum Axis {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Named columns of equal length.
+/// Named columns. Their i-th values belong together; the columns of a grain that has left the box
+/// end before the others.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     /// Names.
@@ -58,9 +59,9 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Returns the number of rows.
+    /// Returns the number of rows of the longest column.
     pub fn rows(&self) -> usize {
-        self.values.first().map_or(0, Vec::len)
+        self.values.iter().map(Vec::len).max().unwrap_or(0)
     }
 
     /// Returns a column by name.
@@ -129,8 +130,11 @@ impl Columns {
     }
 }
 
+/// Columns without a number that are common to all grains.
+const COMMON: [&str; 2] = ["time", "time_scaled"];
+
 /// Separates the rows of the grains into numbered columns; the chosen grain also has unnumbered
-/// columns.
+/// columns. The unnumbered time is that of the grain with the most rows.
 fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
     let index = table.column("grain").ok_or("grains.csv has no column \"grain\"")?;
     let count = index.iter().fold(0.0, |a: f64, b| a.max(*b)) as usize + 1;
@@ -140,16 +144,36 @@ fn split_by_grain(table: &Table, chosen: usize) -> Result<Columns, String> {
     let mut columns = Columns::default();
     for name in table.names().iter().filter(|name| *name != "grain") {
         let values = table.column(name).unwrap_or_default();
-        for grain in 0..count {
+        let of_grain = |grain: usize| -> Vec<f64> {
             let rows = values.iter().zip(index).filter(|(_, i)| **i == grain as f64);
-            let own: Vec<f64> = rows.map(|(value, _)| *value).collect();
-            if grain == chosen {
-                columns.push(name, own.clone());
-            }
-            columns.push(format!("{name}{grain}"), own);
+            rows.map(|(value, _)| *value).collect()
+        };
+        let own: Vec<Vec<f64>> = (0..count).map(of_grain).collect();
+        let longest = own.iter().max_by_key(|values| values.len()).cloned().unwrap_or_default();
+        if name == "time" {
+            check_times(&own, &longest)?;
+        }
+        let unnumbered = if COMMON.contains(&name.as_str()) { &longest } else { &own[chosen] };
+        columns.push(name, unnumbered.clone());
+        for (grain, values) in own.into_iter().enumerate() {
+            columns.push(format!("{name}{grain}"), values);
         }
     }
     Ok(columns)
+}
+
+/// Checks that the rows of every grain are at the first of the common times: a grain that has left
+/// the box does not return. Otherwise the i-th rows of two grains would be at different times.
+fn check_times(times: &[Vec<f64>], common: &[f64]) -> Result<(), String> {
+    for (grain, own) in times.iter().enumerate() {
+        if let Some((found, expected)) = own.iter().zip(common).find(|(a, b)| a != b) {
+            return Err(format!(
+                "grains.csv has a row of grain {grain} at {found} s, and one of another grain at \
+                 {expected} s instead: rows are missing"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Reads the slice of a plane with the latest time.
@@ -235,6 +259,26 @@ mod tests {
         assert_eq!(columns.get("z").unwrap(), [2.0, 4.0]);
         assert_eq!(columns.get("time").unwrap(), [0.0, 1.0]);
         assert!(Columns::read_run(folder.path(), &TableSource::Grains, 2).is_err());
+    }
+
+    /// Grain 0 has left after 1 s; its columns end, and the time goes on.
+    #[test]
+    fn the_columns_of_a_grain_that_leaves_end() {
+        let text = "time,grain,z\n0,0,1\n0,1,2\n1,0,3\n1,1,4\n2,1,6\n";
+        let folder = folder_with("grains.csv", text);
+        for chosen in [0, 1] {
+            let columns = Columns::read_run(folder.path(), &TableSource::Grains, chosen).unwrap();
+            assert_eq!(columns.get("time").unwrap(), [0.0, 1.0, 2.0]);
+            assert_eq!(columns.get("time0").unwrap(), [0.0, 1.0]);
+            assert_eq!(columns.get("z0").unwrap(), [1.0, 3.0]);
+            assert_eq!(columns.get("z1").unwrap(), [2.0, 4.0, 6.0]);
+            assert_eq!(columns.rows(), 3);
+        }
+        // A row of grain 0 is missing in the middle.
+        let text = "time,grain,z\n0,0,1\n0,1,2\n1,1,4\n2,0,5\n2,1,6\n";
+        let folder = folder_with("grains.csv", text);
+        let error = Columns::read_run(folder.path(), &TableSource::Grains, 0).unwrap_err();
+        assert!(error.contains("grain 0 at 2 s") && error.contains("1 s instead"), "{error}");
     }
 
     #[test]

@@ -15,7 +15,8 @@ pub(crate) fn check(text: &str) -> Result<(), String> {
     parse(text).map(|_| ())
 }
 
-/// Evaluates an expression for every row; its names are columns or constants.
+/// Evaluates an expression for every row that all its columns have; its names are columns or
+/// constants.
 pub(crate) fn evaluate(
     text: &str,
     columns: &Columns,
@@ -36,6 +37,12 @@ pub(crate) fn evaluate(
         )),
     };
     let names: Vec<Values> = parsed.var_names().iter().map(values).collect::<Result<_, _>>()?;
+    // The columns of a grain that has left the box are shorter.
+    let lengths = names.iter().filter_map(|values| match values {
+        Values::Column(column) => Some(column.len()),
+        Values::Constant(_) => None,
+    });
+    let rows = lengths.min().unwrap_or(columns.rows());
     let mut row = vec![0.0; names.len()];
     let at = |i: usize| {
         for (slot, values) in row.iter_mut().zip(&names) {
@@ -46,11 +53,30 @@ pub(crate) fn evaluate(
         }
         parsed.eval(&row).map_err(|e| format!("'{text}': {e}"))
     };
-    (0..columns.rows()).map(at).collect()
+    (0..rows).map(at).collect()
 }
 
 /// Evaluates an expression of constants only.
 pub(crate) fn constant(text: &str, constants: &BTreeMap<String, f64>) -> Result<f64, String> {
     let one_row = Columns { names: vec![String::new()], values: vec![vec![0.0]] };
     evaluate(text, &one_row, constants).map(|values| values[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_those_of_the_shortest_column() {
+        let columns = Columns {
+            names: ["a", "b"].map(str::to_owned).to_vec(),
+            values: vec![vec![5.0, 6.0, 7.0], vec![1.0, 2.0]],
+        };
+        let constants = BTreeMap::from([("c".to_owned(), 10.0)]);
+        let of = |text: &str| evaluate(text, &columns, &constants).unwrap();
+        assert_eq!(of("a-b"), [4.0, 4.0]);
+        assert_eq!(of("c*b"), [10.0, 20.0]);
+        assert_eq!(of("a"), [5.0, 6.0, 7.0]);
+        assert_eq!(of("c"), [10.0; 3]);
+    }
 }

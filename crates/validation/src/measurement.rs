@@ -103,7 +103,8 @@ impl Sampling {
         self.data.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// Independent variable, expression in every row of the table, and name of the former.
+    /// Independent variable and expression in every row of the table that has both, and name of
+    /// the former.
     fn rows(
         &self,
         folder: &Path,
@@ -115,8 +116,11 @@ impl Sampling {
             (None, TableSource::Slice(_)) => columns.names[0].clone(),
             (None, _) => "time".to_string(),
         };
-        let x = expression::evaluate(&against, &columns, constants)?;
-        let y = expression::evaluate(&self.of, &columns, constants)?;
+        let mut x = expression::evaluate(&against, &columns, constants)?;
+        let mut y = expression::evaluate(&self.of, &columns, constants)?;
+        let rows = x.len().min(y.len());
+        x.truncate(rows);
+        y.truncate(rows);
         Ok(((x, y), against))
     }
 
@@ -232,4 +236,26 @@ fn summary_value(folder: &Path, key: &str) -> Result<f64, String> {
     }
     let number = value.as_f64();
     number.ok_or_else(|| format!("\"{key}\" is {value} in summary.json"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Grain 0 leaves after 1 s, grain 1 stays.
+    #[test]
+    fn a_grain_that_leaves_is_measured_while_it_is_in_the_box() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = "time,grain,z\n0,0,1\n0,1,2\n1,0,0.5\n1,1,4\n2,1,8\n";
+        std::fs::write(folder.path().join("grains.csv"), text).unwrap();
+        let measured = |of: &str, grain: usize, measure: Measure| {
+            let sampling = Sampling { of: of.into(), grain, ..Sampling::default() };
+            sampling.measure(measure, folder.path(), &BTreeMap::new()).unwrap()
+        };
+        assert_eq!(measured("z0-z1", 0, Measure::Last), -3.5);
+        assert_eq!(measured("z0-z1", 1, Measure::Slope), -2.5);
+        assert_eq!(measured("z", 1, Measure::Last), 8.0);
+        assert_eq!(measured("z1", 0, Measure::Mean), 4.5);
+        assert_eq!(measured("z", 0, Measure::Min), 0.5);
+    }
 }
