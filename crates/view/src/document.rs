@@ -8,10 +8,11 @@ use grainwake_report::features::RunFeatures;
 use grainwake_report::run_folder::RunFolder;
 use serde::Serialize;
 
+use crate::frame_cache::FrameCache;
 use crate::meshes::{Mesh, bodies};
 use crate::packed::Packed;
 use crate::poses::{Poses, poses};
-use crate::slices::{FrameCache, Series, SliceLimits, series};
+use crate::slices::{Series, SliceLimits, series};
 
 /// List of runs.
 #[derive(Clone, Debug, Serialize)]

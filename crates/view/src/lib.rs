@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `packed` | arrays of numbers as text |
 //! | `meshes`, `poses`, `slices` | grains, their motion, fields |
+//! | `frame_cache` | encoded slices, for the next request of a run |
 //! | `document` | JSON of a run and of the list of runs |
 //! | `viewer` | run folders and their current state |
 //! | `page` | HTML page with its content security policy |
@@ -16,6 +17,7 @@
 
 mod document;
 mod error;
+mod frame_cache;
 mod meshes;
 mod packed;
 mod page;

@@ -25,6 +25,11 @@ pub struct Packed {
 }
 
 impl Packed {
+    /// Returns the length of the text [bytes].
+    pub fn text_bytes(&self) -> usize {
+        self.data.len()
+    }
+
     /// Packs bytes; each is stored as its difference from the one before.
     pub fn bytes(bytes: &[u8]) -> Packed {
         let before = [0].into_iter().chain(bytes.iter().copied());

@@ -1,12 +1,10 @@
 //! Slices of the fields: 8 bits per value, thinned in space and time.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
-
 use grainwake_formats::vti::{Array, Image};
 use grainwake_report::run_folder::{FrameFile, RunFolder};
 use serde::Serialize;
 
+use crate::frame_cache::{Frame, FrameCache, FrameKey, Stamp};
 use crate::packed::Packed;
 
 /// Names of the fields of a frame, in the order of their bytes.
@@ -29,23 +27,6 @@ pub struct Series {
     pub coarsening: usize,
 }
 
-/// Slice at one time.
-#[derive(Clone, Debug, Serialize)]
-pub struct Frame {
-    /// Time [s].
-    pub time: f64,
-    /// Cells along the two axes of the plane, in the order x, y, z.
-    pub cells: [usize; 2],
-    /// Lower corner [m]; along the normal, the middle of the layer.
-    pub corner: [f64; 3],
-    /// Edge of the cells along the two axes [m].
-    pub spacing: [f64; 2],
-    /// Values of the codes 0 and 255 of each field.
-    pub ranges: [[f64; 2]; 7],
-    /// Codes, all of the first field, then of the next; missing fields are 0.
-    pub codes: Packed,
-}
-
 /// Limits of the slices of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceLimits {
@@ -54,9 +35,6 @@ pub struct SliceLimits {
     /// Cells of all frames; further frames are thinned.
     pub total: usize,
 }
-
-/// Encoded frames by file, layer and coarsening; files of slices never change.
-pub type FrameCache = HashMap<(PathBuf, Option<usize>, usize), Frame>;
 
 /// A plane with its files.
 struct Plane<'a> {
@@ -75,10 +53,11 @@ pub fn series(
 ) -> Vec<Series> {
     let planes = planes(run);
     let count = planes.len().max(1);
-    planes
-        .into_iter()
-        .filter_map(|plane| encode(run, &plane, count, limits, cache, notes))
-        .collect()
+    cache.begin();
+    let encoded =
+        planes.iter().filter_map(|plane| encode(run, plane, count, limits, cache, notes)).collect();
+    cache.end(&run.path);
+    encoded
 }
 
 fn planes(run: &RunFolder) -> Vec<Plane<'_>> {
@@ -121,10 +100,9 @@ fn encode(
         if index < next && index != last {
             continue;
         }
-        let frame = match coarsening {
-            Some(n) => cache.get(&(file.file.clone(), plane.middle, n)).cloned(),
-            None => None,
-        };
+        let key = |n| FrameKey { file: file.file.clone(), middle: plane.middle, coarsening: n };
+        let stamp = Stamp::of(&file.file);
+        let frame = coarsening.and_then(|n| cache.get(&key(n), stamp));
         let frame = match frame.zip(axis) {
             Some((frame, _)) => frame,
             None => {
@@ -147,7 +125,7 @@ fn encode(
                     n
                 });
                 let frame = layer.coarsened(n).encode(file.time);
-                cache.insert((file.file.clone(), plane.middle, n), frame.clone());
+                cache.insert(key(n), stamp, frame.clone());
                 frame
             }
         };

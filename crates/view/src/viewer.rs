@@ -12,7 +12,7 @@ use grainwake_report::thumbnail::thumbnail;
 
 use crate::document::{Index, Limits, RunDocument, StudyTable};
 use crate::error::ViewError;
-use crate::slices::FrameCache;
+use crate::frame_cache::FrameCache;
 
 /// Run folder with its name on the page.
 #[derive(Clone, Debug, PartialEq, Eq)]

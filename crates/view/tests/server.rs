@@ -190,3 +190,22 @@ fn a_run_that_goes_on_has_a_new_revision() {
     common::append_row(run.path(), 0.2);
     assert_ne!(before, revision());
 }
+
+/// `grainwake run --force` writes other slices under the same names.
+#[test]
+fn a_replaced_run_shows_its_own_slices() {
+    let run = common::run_folder();
+    let later = run.path().join("slices/y-grain0_000001.vti");
+    common::write_slice(&later, 0.1, 0.5);
+    let address = serve(run.path());
+    let before = ask(address, "GET /runs/0.json", "");
+    assert_eq!(before.matches("[0.5,0.5]").count(), 6, "{before}");
+    let written = std::fs::metadata(&later).unwrap().modified().unwrap();
+    common::write_slice(&later, 0.1, 2.5);
+    // The clock of the file system may be coarse.
+    let file = std::fs::File::options().append(true).open(&later).unwrap();
+    file.set_modified(written + std::time::Duration::from_secs(1)).unwrap();
+    let after = ask(address, "GET /runs/0.json", "");
+    let counts = ["[0.5,0.5]", "[2.5,2.5]"].map(|range| after.matches(range).count());
+    assert_eq!(counts, [3, 3], "{after}");
+}

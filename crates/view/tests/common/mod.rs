@@ -42,18 +42,26 @@ pub fn run_folder() -> TempDir {
     let event = Event::new(EventKind::Kiss, 0.1, &[0, 1]).to_line().unwrap();
     std::fs::write(path.join("events.jsonl"), event).unwrap();
     std::fs::create_dir(path.join("slices")).unwrap();
-    let count = 4 * 8;
+    write_slice(&path.join("slices/y-grain0_000000.vti"), 0.0, 0.5);
+    folder
+}
+
+/// Writes a slice with all components of the velocity equal to `speed` [m/s].
+pub fn write_slice(file: &Path, time: f64, speed: f32) {
     let image = Image {
         frame: Frame {
             cells: [4, 1, 8],
             spacing: DVec3::splat(2.5e-3),
             origin: DVec3::new(0.0, 5e-3, 0.0),
-            time: 0.0,
+            time,
         },
-        arrays: vec![Array { name: "velocity".into(), components: 3, data: vec![0.5; 3 * count] }],
+        arrays: vec![Array {
+            name: "velocity".into(),
+            components: 3,
+            data: vec![speed; 3 * 4 * 8],
+        }],
     };
-    vti::write(&path.join("slices/y-grain0_000000.vti"), &image).unwrap();
-    folder
+    vti::write(file, &image).unwrap();
 }
 
 /// Appends the rows of both grains at a time [s].
