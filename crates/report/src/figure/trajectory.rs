@@ -32,6 +32,11 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
     };
     let room = COLUMN - LEFT - MIDDLE - RIGHT;
     let scale = (room / (first.width() + second.width())).min(330.0 / first.height());
+    // A damaged case may hold absurd sizes, of which there is no picture.
+    let sizes = [first, second].map(|window| [window.width(), window.height()]);
+    if !sizes.as_flattened().iter().all(|size| (scale * size).is_finite() && *size > 0.0) {
+        return None;
+    }
     // The names of a pair are long: one per row; other names are in four columns.
     let columns = if grains.len() > 2 { 4 } else { 1 };
     let top = 8.0 + 10.0 * grains.len().div_ceil(columns) as f64;

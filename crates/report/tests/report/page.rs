@@ -358,6 +358,32 @@ fn empty_tables_and_strange_numbers_do_not_panic() {
     remove(&folder);
 }
 
+/// `inf` and `nan` are numbers of TOML.
+#[test]
+fn absurd_numbers_in_the_case_do_not_panic() {
+    let folder = small_pair(0.9);
+    std::fs::remove_dir_all(folder.join("slices")).unwrap();
+    let resolved = folder.join("case.resolved.toml");
+    let sound = std::fs::read_to_string(&resolved).unwrap();
+    assert!(names(&render(&folder).unwrap()).contains(&"trajectories".to_owned()));
+    let [size, origin] = ["size = [0.025, 0.025, 0.0975]", "origin = [0.0, 0.0, 0.0]"];
+    for (from, to) in [
+        (size, "size = [inf, inf, inf]"),
+        (size, "size = [0.025, 0.025, inf]"),
+        (size, "size = [inf, 0.025, 0.0975]"),
+        (size, "size = [1e308, 1e308, 1e308]"),
+        (origin, "origin = [nan, nan, nan]"),
+        (origin, "origin = [0.0, 0.0, inf]"),
+        (origin, "origin = [1e300, 1e300, 1e300]"),
+    ] {
+        replace(&folder, "case.resolved.toml", from, to);
+        let rendered = render(&folder).unwrap();
+        assert!(page(&rendered).ends_with("</html>\n"), "{to}");
+        std::fs::write(&resolved, &sound).unwrap();
+    }
+    remove(&folder);
+}
+
 #[test]
 fn other_runs_get_their_own_figures() {
     let folder = fresh::folder("single");
