@@ -6,7 +6,7 @@ use grainwake_shape::mesh::{
     MeshOptions, TriangleMesh, mesh_from_memory, read_mesh, shape_from_mesh,
 };
 use grainwake_shape::{
-    QualityBounds, ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile, analytic,
+    Field, QualityBounds, ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile, analytic,
 };
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;
@@ -745,18 +745,22 @@ fn the_quality_does_not_depend_on_the_unit() {
 /// Cells and margins add up to 50, 42 and 34 cells, which rounding makes 51 or 43 in some units.
 #[test]
 fn the_grid_does_not_depend_on_the_unit() {
-    let error = |unit: f64| {
+    let built = |unit: f64| {
         let [a, b, c] = [1.0, 0.8, 0.6].map(|axis| 0.5 * unit * axis);
         let (cells, nodes) = (Some(40), Some(200));
         let options = ShapeOptions { cells, nodes, roundness: false, ..Default::default() };
         let shape = analytic::ellipsoid(a, b, c, &options).unwrap();
-        [shape.quality().unwrap().gradient_error, shape.volume() / unit.powi(3)]
+        let error = shape.quality().unwrap().gradient_error;
+        let Field::Sampled(field) = shape.field() else { panic!("an ellipsoid is sampled") };
+        (field.dims(), error, shape.volume() / unit.powi(3))
     };
-    let [gradient, volume] = error(1.0);
+    let (dims, gradient, volume) = built(1.0);
     for unit in [1e-3, 25.4e-3, 0.7e-3, 0.7, 3.0] {
-        let [other, scaled] = error(unit);
-        println!("{unit}: {other} {gradient}, {}", scaled / volume - 1.0);
+        let (other_dims, other, scaled) = built(unit);
+        println!("{unit}: {other} {gradient}, {}, {other_dims:?}", scaled / volume - 1.0);
+        assert_eq!(other_dims, dims, "{unit}");
         close(other, gradient, 0.01);
+        close(scaled, volume, 1e-5);
     }
 }
 

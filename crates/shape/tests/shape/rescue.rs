@@ -1,5 +1,6 @@
 //! Scans that need care: specks, noise, masks and missing thresholds.
 
+use crate::common::shared;
 use crate::render::{Noise, blurred, greys, shares};
 use glam::DVec3;
 use grainwake_shape::scan::{
@@ -233,14 +234,11 @@ fn a_grey_image_without_a_threshold_is_refused() {
 /// Labels of real scans: a single grain, and a packing of many grains.
 #[test]
 fn real_labels_are_not_taken_for_grey() {
-    let folder =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/grains/scans");
-    let powder = folder.join("imppy3d_powder_synthetic/powder_256.tif");
-    if !powder.exists() {
-        eprintln!("skipped: no {}", powder.display());
+    let [powder, one] = ["imppy3d_powder_synthetic/powder_256.tif", "nrel_nmc/grains/nmc_0238.tif"]
+        .map(|file| shared(&format!("grains/scans/{file}")));
+    let Some((powder, one)) = powder.zip(one) else {
         return;
-    }
-    let one = folder.join("nrel_nmc/grains/nmc_0238.tif");
+    };
     let (volume, _) = read_volume(&one, &ReadLimits::default()).unwrap();
     scan(&volume, &options()).unwrap();
     let (volume, _) = read_volume(&powder, &ReadLimits::default()).unwrap();

@@ -220,10 +220,10 @@ fn a_real_labelled_ct_grain_becomes_a_shape() {
     };
     let (volume, source) = read_volume(&path, &ReadLimits::default()).unwrap();
     let options = ScanOptions { pad: true, ..ScanOptions::new(1e-6) };
-    for grain in shapes_from_volume(&volume, &source, &options).unwrap() {
-        let shape = grain.shape.unwrap();
-        close(shape.volume(), grain.voxels as f64 * 1e-18, 0.02);
-    }
+    let grains = shapes_from_volume(&volume, &source, &options).unwrap();
+    let [grain] = &grains[..] else { panic!("{} grains", grains.len()) };
+    let shape = grain.shape.as_ref().unwrap();
+    close(shape.volume(), grain.voxels as f64 * 1e-18, 0.02);
 }
 
 /// A real packing of touching powder grains: as many interior grains, of the same size, as an
