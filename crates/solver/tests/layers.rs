@@ -28,7 +28,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("report", &["formats", "plot", "shape"]),
     ("view", &["formats", "plot", "report", "shape"]),
     ("study", &["formats", "plot", "report", "run", "shape", "solver"]),
-    ("validation", &["formats", "plot", "report", "run", "shape", "solver"]),
+    ("validation", &["formats", "plot", "report", "run", "shape"]),
     (
         "cli",
         &[
