@@ -144,13 +144,6 @@ pub enum Fill {
     Hollow,
 }
 
-impl Fill {
-    /// Returns the fill of a marker that is a bound or not.
-    pub fn of_bound(bound: bool) -> Fill {
-        if bound { Fill::Hollow } else { Fill::Solid }
-    }
-}
-
 /// Shapes of data points that differ without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {

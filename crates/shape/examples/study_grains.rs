@@ -1,9 +1,8 @@
-//! Makes the 16 grains of the morphology study again:
+//! Makes the 16 grains of the morphology study and their table again:
 //!
 //! `cargo run --release -p grainwake-shape --example study_grains -- studies/dkt-morphology/grains`
 
 use grainwake_shape::family::{FamilyTarget, family_grain, family_options};
-use grainwake_shape::render::Picture;
 use grainwake_shape::{Result, Shape, write_table};
 use std::path::{Path, PathBuf};
 
@@ -28,7 +27,7 @@ fn main() -> std::process::ExitCode {
 }
 
 fn make(folder: &Path) -> Result<()> {
-    let (mut pictures, mut rows) = (Vec::new(), Vec::new());
+    let mut rows = Vec::new();
     let mut number = 0;
     for sphericity in SPHERICITY {
         for roundness in ROUNDNESS {
@@ -39,11 +38,9 @@ fn make(folder: &Path) -> Result<()> {
             shape.save(&path)?;
             show(&path, &shape);
             rows.push((format!("{number:02}"), shape.record()));
-            pictures.push(Picture::three_sides(&shape, 130, false));
         }
     }
-    write_table(&folder.join("table.csv"), &rows, &[])?;
-    Picture::sheet(&pictures, 4).save(&folder.join("sheet.png"))
+    write_table(&folder.join("table.csv"), &rows, &[])
 }
 
 fn show(path: &Path, shape: &Shape) {

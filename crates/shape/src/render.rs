@@ -1,11 +1,8 @@
 //! Rendered images of grains.
 
-use crate::error::{Result, ShapeError};
 use crate::{Field, Shape};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use std::io::Write;
-use std::path::Path;
 
 /// An RGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,26 +60,6 @@ impl Picture {
         }
     }
 
-    /// Writes a PNG file.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        let io = |e| ShapeError::io(path, e);
-        let file = std::io::BufWriter::new(std::fs::File::create(path).map_err(io)?);
-        self.encode(file).map_err(io)
-    }
-
-    /// Writes the image as PNG.
-    ///
-    /// # Errors
-    /// Errors of the writer.
-    pub fn encode(&self, out: impl Write) -> std::io::Result<()> {
-        let mut encoder = png::Encoder::new(out, self.width as u32, self.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let bytes: Vec<u8> = self.pixels.iter().flatten().copied().collect();
-        let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&bytes));
-        written.map_err(std::io::Error::other)
-    }
-
     /// Renders a grain in orthographic projection, lit from the upper left. The image is `pixels`
     /// wide and high and shows `width` [m]; with `nodes` the surface nodes are drawn as dots.
     pub fn of(shape: &Shape, view: View, pixels: usize, width: f64, nodes: bool) -> Picture {
@@ -114,14 +91,8 @@ impl Picture {
         picture
     }
 
-    /// Renders three sides of a grain in a row: broad side, long side, end.
-    pub fn three_sides(shape: &Shape, pixels: usize, nodes: bool) -> Picture {
-        let width = 2.1 * shape.bounding_radius();
-        Picture::sides(shape, DMat3::IDENTITY, pixels, width, nodes)
-    }
-
-    /// Renders three sides in a frame that `turn` maps to the grain's own; each side shows `width`
-    /// [m].
+    /// Renders three sides of a grain in a row: broad side, long side, end. `turn` maps the frame
+    /// of the image to the grain's own; each side shows `width` [m].
     pub fn sides(shape: &Shape, turn: DMat3, pixels: usize, width: f64, nodes: bool) -> Picture {
         let mut picture = Picture::blank(3 * pixels, pixels);
         for (n, view) in [View::BROAD, View::SIDE, View::END].into_iter().enumerate() {
@@ -130,18 +101,6 @@ impl Picture {
             picture.paste(&side, n * pixels, 0);
         }
         picture
-    }
-
-    /// Arranges images of equal size in rows of `columns`.
-    pub fn sheet(pictures: &[Picture], columns: usize) -> Picture {
-        let columns = columns.clamp(1, pictures.len().max(1));
-        let (width, height) = pictures.first().map_or((1, 1), |p| (p.width, p.height));
-        let rows = pictures.len().div_ceil(columns).max(1);
-        let mut sheet = Picture::blank(width * columns, height * rows);
-        for (n, picture) in pictures.iter().enumerate() {
-            sheet.paste(picture, n % columns * width, n / columns * height);
-        }
-        sheet
     }
 
     /// Draws a square of `DOT` pixels with this upper left corner.
