@@ -1,8 +1,9 @@
 //! Limits on the size of input files and on memory.
 
 use crate::error::{Result, ShapeError};
+use grainwake_formats::bounded_file;
 use sha2::{Digest, Sha256};
-use std::io::Read;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Limits on the size of input. Files that exceed them are refused before memory is allocated.
@@ -104,24 +105,12 @@ impl SourceFile {
 
 /// Reads a whole file within the size limit; returns content and identity.
 pub(crate) fn read_bytes(path: &Path, limits: &ReadLimits) -> Result<(Vec<u8>, SourceFile)> {
-    let file = grainwake_formats::bounded_file::open(path).map_err(|e| ShapeError::io(path, e))?;
-    let claimed = file.metadata().map_err(|e| ShapeError::io(path, e))?.len();
-    let too_large = |bytes: u64| {
-        let claimed = format!("at least {bytes} bytes");
-        ShapeError::too_large(path, &claimed, limits.file_bytes, "bytes")
-    };
-    if claimed > limits.file_bytes {
-        return Err(too_large(claimed));
-    }
-    let mut bytes = Vec::new();
-    // The size is checked again while reading: that of a pipe or a growing file is not known
-    // before.
-    file.take(limits.file_bytes + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| ShapeError::io(path, e))?;
-    if bytes.len() as u64 > limits.file_bytes {
-        return Err(too_large(bytes.len() as u64));
-    }
+    let bytes = bounded_file::read_bytes(path, limits.file_bytes).map_err(|e| match e.kind() {
+        ErrorKind::FileTooLarge => {
+            ShapeError::TooLarge { path: path.into(), reason: e.to_string() }
+        }
+        _ => ShapeError::io(path, e),
+    })?;
     let source = SourceFile::new(path, Sha256::new_with_prefix(&bytes));
     Ok((bytes, source))
 }
