@@ -41,6 +41,8 @@
 pub mod analytic;
 mod assemble;
 mod compare;
+#[cfg(test)]
+mod disk_tests;
 mod distance;
 mod error;
 pub mod family;

@@ -2,6 +2,7 @@
 
 use crate::Record;
 use crate::error::{Result, ShapeError};
+use grainwake_formats::disk::write_atomically;
 use std::path::Path;
 
 /// Returns the columns after the grain name; values that were not measured are `None`.
@@ -30,25 +31,43 @@ fn columns(r: &Record) -> [(&'static str, Option<f64>); 19] {
 }
 
 /// Writes one row per grain: its name, its measures, and the columns `more` (name and one value per
-/// grain). Values that were not measured are left empty.
+/// grain). Values that were not measured are left empty. After an error an existing file is
+/// unchanged.
+///
+/// # Errors
+/// Errors of the operating system.
 pub fn write_table(
     path: &Path,
     rows: &[(String, Record)],
     more: &[(&str, Vec<f64>)],
 ) -> Result<()> {
-    let failed = |e: csv::Error| ShapeError::io(path, e);
-    let mut writer = csv::Writer::from_path(path).map_err(failed)?;
-    for (row, (name, record)) in rows.iter().enumerate() {
-        let columns = columns(record).into_iter();
-        let more = more.iter().map(|(name, values)| (*name, values.get(row).copied()));
-        let (names, values): (Vec<_>, Vec<_>) = columns.chain(more).unzip();
-        if row == 0 {
-            let header = std::iter::once("grain").chain(names);
-            writer.write_record(header).map_err(failed)?;
+    let written = write_atomically(path, true, |out| {
+        let mut writer = csv::Writer::from_writer(out);
+        for (row, (name, record)) in rows.iter().enumerate() {
+            let columns = columns(record).into_iter();
+            let more = more.iter().map(|(name, values)| (*name, values.get(row).copied()));
+            let (names, values): (Vec<_>, Vec<_>) = columns.chain(more).unzip();
+            if row == 0 {
+                writer.write_record(std::iter::once("grain").chain(names))?;
+            }
+            let values =
+                values.into_iter().map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")));
+            writer.write_record(std::iter::once(name.clone()).chain(values))?;
         }
-        let values = values.into_iter().map(|v| v.map_or(String::new(), |v| format!("{v:.7e}")));
-        let cells = std::iter::once(name.clone()).chain(values);
-        writer.write_record(cells).map_err(failed)?;
+        writer.flush()
+    });
+    written.map_err(|e| ShapeError::io(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Shape;
+    use crate::disk_tests::fails_as_a_whole;
+
+    #[test]
+    fn a_failed_table_leaves_the_earlier_one() {
+        let rows = [("a".to_owned(), Shape::sphere(1e-3, 100).record())];
+        fails_as_a_whole("table.csv", |path| write_table(path, &rows, &[("more", vec![1.0])]));
     }
-    writer.flush().map_err(|e| ShapeError::io(path, e))
 }

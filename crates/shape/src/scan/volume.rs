@@ -5,6 +5,8 @@ use crate::grid::place;
 use crate::limits::ReadLimits;
 use ::tiff::encoder::colortype::{Gray16, Gray32};
 use ::tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
+use grainwake_formats::disk::write_atomically;
+use std::io::Cursor;
 use std::path::Path;
 
 /// Voxel values.
@@ -94,27 +96,39 @@ impl Volume {
 }
 
 impl Volume {
-    /// Writes labels as a multi-page TIFF of 16 bits (32 bits if labels need them).
+    /// Writes labels as a multi-page TIFF of 16 bits (32 bits if labels need them). After an error
+    /// an existing file is unchanged.
+    ///
+    /// # Errors
+    /// The values are grey values, or those of the operating system.
     pub fn save_labels(&self, path: &Path) -> Result<()> {
         let Voxels::Labels(labels) = &self.voxels else {
             return Err(ShapeError::unsupported(path, "grey values are not labels"));
         };
-        let failed = |e: ::tiff::TiffError| ShapeError::io(path, std::io::Error::other(e));
-        let file = std::fs::File::create(path).map_err(|e| ShapeError::io(path, e))?;
-        let mut encoder = TiffEncoder::new_big(std::io::BufWriter::new(file))
-            .map_err(failed)?
+        let bytes = self.label_tiff(labels).map_err(|e| ShapeError::io(path, e))?;
+        let written = write_atomically(path, true, |out| out.write_all(&bytes));
+        written.map_err(|e| ShapeError::io(path, e))
+    }
+
+    /// Encodes labels in memory, because the encoder moves back and forth in its output. Compressed
+    /// labels take far less memory than the labels themselves.
+    fn label_tiff(&self, labels: &[u32]) -> std::io::Result<Vec<u8>> {
+        let mut out = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new_big(&mut out)
+            .map_err(std::io::Error::other)?
             .with_compression(Compression::Deflate(DeflateLevel::Fast));
         let small = labels.iter().all(|l| *l <= u32::from(u16::MAX));
         let [width, height, _] = self.dims.map(|n| n as u32);
         for page in labels.chunks(self.dims[0] * self.dims[1]) {
-            if small {
+            let written = if small {
                 let page: Vec<u16> = page.iter().map(|l| *l as u16).collect();
-                encoder.write_image::<Gray16>(width, height, &page).map_err(failed)?;
+                encoder.write_image::<Gray16>(width, height, &page)
             } else {
-                encoder.write_image::<Gray32>(width, height, page).map_err(failed)?;
-            }
+                encoder.write_image::<Gray32>(width, height, page)
+            };
+            written.map_err(std::io::Error::other)?;
         }
-        Ok(())
+        Ok(out.into_inner())
     }
 }
 
@@ -130,6 +144,7 @@ pub(super) fn count(path: &Path, dims: [u64; 3], limits: &ReadLimits) -> Result<
 mod tests {
     use super::super::read_volume;
     use super::*;
+    use crate::disk_tests::fails_as_a_whole;
 
     #[test]
     fn labels_are_written_and_read_back() {
@@ -141,5 +156,10 @@ mod tests {
             volume.save_labels(&path).unwrap();
             assert_eq!(read_volume(&path, &ReadLimits::default()).unwrap().0, volume);
         }
+    }
+    #[test]
+    fn a_failed_label_image_leaves_the_earlier_one() {
+        let volume = Volume::from_labels([3, 2, 2], vec![7; 12]).unwrap();
+        fails_as_a_whole("labels.tif", |path| volume.save_labels(path));
     }
 }
