@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use grainwake_report::grain_sheet::{GrainPanel, sheet};
+use grainwake_report::write_file;
 
 use crate::exit::Exit;
 
@@ -30,7 +31,7 @@ pub fn names<F: AsRef<Path>>(files: &[F]) -> Vec<String> {
 pub fn save(path: &Path, panels: Vec<GrainPanel>, columns: usize) -> Result<(), Exit> {
     let picture = sheet(panels, columns).and_then(|picture| picture.to_png());
     let png = picture.map_err(Exit::cannot("draw", path))?;
-    std::fs::write(path, png).map_err(Exit::cannot("write", path))
+    write_file(path, &png).map_err(Exit::cannot("write", path))
 }
 
 #[cfg(test)]

@@ -9,11 +9,14 @@ mod mesh;
 mod preview;
 mod refused;
 mod scan;
+mod scan_folder;
 mod table;
+mod treated;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::disk;
 use grainwake_report::grain_sheet::GrainPanel;
 use grainwake_run::case::parse_length;
 use grainwake_run::check_grain_size;
@@ -150,7 +153,7 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Creates a folder and those above it.
 fn create(folder: &Path) -> Result<(), Exit> {
-    std::fs::create_dir_all(folder).map_err(Exit::cannot("create the folder", folder))
+    disk::create_folder(folder).map_err(Exit::cannot("create the folder", folder))
 }
 
 /// Refuses a file name without the extension `.grain`.

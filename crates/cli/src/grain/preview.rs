@@ -9,6 +9,7 @@ use grainwake_plot::raster::Raster;
 use grainwake_plot::scale_bar::ScaleBar;
 use grainwake_plot::style::{PAGE, PIXELS_PER_POINT, SMALL, TEXT};
 use grainwake_plot::{literal, text};
+use grainwake_report::write_file;
 use grainwake_shape::scan::{Scan, Volume, Voxels};
 
 use super::refused::{line, trial};
@@ -88,7 +89,7 @@ pub fn draw(
     let legend = legend(args, dims, scan);
     let drawing = page(&image, &panels, &legend);
     let png = drawing.to_png().map_err(Exit::cannot("draw", picture))?;
-    std::fs::write(picture, png).map_err(Exit::cannot("write", picture))
+    write_file(picture, &png).map_err(Exit::cannot("write", picture))
 }
 
 /// Returns the grey levels between the 1st and 99th percentile; labels are plain on white.

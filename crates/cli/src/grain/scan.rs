@@ -1,29 +1,21 @@
 //! `grain from-scan`.
 
-use std::path::{Path, PathBuf};
-
-use grainwake_report::grain_sheet::GrainPanel;
+use grainwake_shape::ReadLimits;
 use grainwake_shape::scan::{
-    Scan, ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
+    ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
 };
-use grainwake_shape::{ReadLimits, Shape, write_table};
 use indicatif::{ProgressBar, ProgressStyle};
-use rayon::prelude::*;
-use serde_json::json;
 
-use super::preview;
-use super::refused::{advice, lines, named};
+use super::refused::lines;
+use super::treated::treated;
 use super::{
-    create, diameter, drawn, folder, length, may_draw, may_write, not_input, options, plausible,
-    save, sized, table,
+    diameter, folder, length, may_draw, may_write, not_input, options, preview, save, scan_folder,
+    sized,
 };
 use crate::args::FromScanArgs;
-use crate::exit::{BAD_INPUT, Exit};
+use crate::exit::Exit;
 use crate::progress::count;
 use crate::{print, tell};
-
-/// Contact sheet: pixels per grain, grains per row, and maximum number of grains.
-const SHEET: (usize, usize, usize) = (110, 12, 600);
 
 /// Creates one grain, or all grains of an image.
 pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
@@ -35,8 +27,8 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     } else {
         folder(output)?;
         if args.preview.is_none() {
-            for file in earlier(output).iter().chain(&tables(output)) {
-                may_write(file, args.new.common.force)?;
+            for file in scan_folder::existing(output) {
+                may_write(&file, args.new.common.force)?;
             }
         }
     }
@@ -89,7 +81,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
     }
     drop(volume);
     if !one_file {
-        return all(args, scan, diameter);
+        return scan_folder::write(args, scan, diameter);
     }
     let grain = match <[ScannedGrain; 1]>::try_from(scan.grains) {
         Ok([grain]) => grain,
@@ -141,169 +133,4 @@ fn how(args: &FromScanArgs) -> Result<ScanOptions, Exit> {
     how.shape.roundness = !args.no_roundness;
     how.check()?;
     Ok(how)
-}
-
-/// Fraction of the surface cut from neighbours above which the roundness is doubtful.
-const MUCH_SHARED: f64 = 0.01;
-
-/// Share of filled cavities in the volume of a grain from which on the output names the grain.
-const CAVITIES_TOLD: f64 = 1e-3;
-
-/// Describes what was changed on grains: specks removed, cavities filled, and labels rescued, by
-/// cure.
-fn treated(grains: &[ScannedGrain]) -> Vec<String> {
-    let mut lines = Vec::new();
-    let cleaned: Vec<&ScannedGrain> = grains.iter().filter(|g| g.specks_removed() > 0.0).collect();
-    let most = cleaned.iter().map(|g| g.specks_removed()).fold(0.0, f64::max);
-    let labels: Vec<u32> = cleaned.iter().map(|g| g.label).collect();
-    if !labels.is_empty() {
-        lines.push(format!(
-            "specks removed from {}, at most {:.2} % of the volume: {}",
-            count(labels.len(), "grain"),
-            100.0 * most.max(5e-5),
-            named(&labels)
-        ));
-    }
-    let hollow = grains.iter().filter(|g| g.cavities_filled() >= CAVITIES_TOLD);
-    let hollow: Vec<&ScannedGrain> = hollow.collect();
-    let most = hollow.iter().map(|g| g.cavities_filled()).fold(0.0, f64::max);
-    let labels: Vec<u32> = hollow.iter().map(|g| g.label).collect();
-    if !labels.is_empty() {
-        lines.push(format!(
-            "cavities filled in {}, at most {:.2} % of the volume: {}",
-            count(labels.len(), "grain"),
-            100.0 * most,
-            named(&labels)
-        ));
-    }
-    let mut cures: Vec<(String, Vec<u32>)> = Vec::new();
-    for (cure, label) in grains.iter().filter_map(|g| Some((g.rescued?.to_string(), g.label))) {
-        match cures.iter_mut().find(|(other, _)| *other == cure) {
-            Some((_, labels)) => labels.push(label),
-            None => cures.push((cure, vec![label])),
-        }
-    }
-    lines.extend(cures.iter().map(|(cure, labels)| {
-        format!("{} rescued with {cure}: {}", count(labels.len(), "grain"), named(labels))
-    }));
-    lines
-}
-
-/// Returns the grain files of an earlier command in a folder.
-fn earlier(folder: &Path) -> Vec<PathBuf> {
-    let ours = |path: &PathBuf| {
-        let name = path.file_name().and_then(|name| name.to_str());
-        let number = name.and_then(|n| n.strip_prefix("label-")?.strip_suffix(".grain"));
-        number.is_some_and(|n| n.len() >= 5 && n.bytes().all(|b| b.is_ascii_digit()))
-    };
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ours).collect();
-    files.sort();
-    files
-}
-
-/// Table, contact sheet and label image of a folder of grains.
-fn tables(place: &Path) -> [PathBuf; 3] {
-    ["table.csv", "sheet.png", "labels.tif"].map(|name| place.join(name))
-}
-
-/// Writes every grain into a folder, with table, contact sheet and label image, and lists rejected
-/// labels with the reason.
-fn all(args: &FromScanArgs, scan: Scan, diameter: Option<f64>) -> Result<(), Exit> {
-    let Scan { mut grains, labels, refusals, .. } = scan;
-    let place = &args.new.output;
-    let name = |label: u32| format!("label-{label:05}");
-    let path = |label: u32| place.join(name(label) + ".grain");
-    let [table_file, sheet, image] = tables(place);
-    let earlier = earlier(place);
-    if let Some(diameter) = diameter {
-        for grain in &mut grains {
-            if let Ok(shape) = &mut grain.shape {
-                *shape = shape.scaled_to_equivalent_diameter(diameter)?;
-            }
-        }
-    }
-    let usable = || grains.iter().filter_map(|g| Some((g.label, g.shape.as_ref().ok()?)));
-    // Only the largest grain is checked, because fragments may be small.
-    let size = |shape: &Shape| shape.equivalent_diameter();
-    let largest = usable().max_by(|a, b| size(a.1).total_cmp(&size(b.1)));
-    if let Some((_, shape)) = largest.filter(|_| diameter.is_none()) {
-        plausible(shape, "--voxel")?;
-    }
-    for file in [&table_file, &sheet, &image] {
-        not_input(file, &args.image)?;
-    }
-    // Grains of an earlier command are not part of the new table and label image.
-    for file in earlier.iter().filter(|_| largest.is_some()) {
-        std::fs::remove_file(file).map_err(Exit::cannot("remove", file))?;
-    }
-    if largest.is_some() {
-        create(place)?;
-    }
-    let advice = advice(&grains);
-    let treated = treated(&grains);
-    let rejected = grains.iter().filter(|g| g.shape.is_err()).count();
-    let pictured: Vec<u32> = usable().take(SHEET.2).map(|(label, _)| label).collect();
-    let outcomes: Vec<_> = grains
-        .into_par_iter()
-        .filter_map(|grain| {
-            let specks = grain.specks_removed();
-            let ScannedGrain { label, voxels, shared_surface, shape, rescued } = grain;
-            let written = shape.ok().map(|shape| {
-                let file = path(label);
-                shape.save(&file)?;
-                let picture = pictured
-                    .binary_search(&label)
-                    .is_ok()
-                    .then(|| GrainPanel::broad(&name(label), &shape, SHEET.0));
-                Ok::<_, Exit>((file, shape.record(), picture))
-            })?;
-            Some((label, voxels, shared_surface, specks, rescued, written))
-        })
-        .collect();
-    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
-    let (mut shared, mut removed) = (Vec::new(), Vec::new());
-    for (label, voxels, shared_surface, specks, rescued, written) in outcomes {
-        let (file, record, picture) = written?;
-        pictures.extend(picture);
-        if args.new.common.json {
-            let rescued = rescued.map(|cure| cure.to_string());
-            print(&json!({ "label": label, "voxels": voxels, "shared_surface": shared_surface, "specks_removed": specks, "rescued": rescued, "file": file, "record": record }).to_string())?;
-        } else {
-            print(&format!(
-                "{}  {} voxels, equivalent diameter {}, Krumbein sphericity {:.3}",
-                file.display(),
-                voxels,
-                table::LengthUnit::of(record.equivalent_diameter_m)
-                    .text(record.equivalent_diameter_m, 4),
-                record.krumbein_sphericity
-            ))?;
-        }
-        rows.push((name(label), record));
-        shared.push(shared_surface);
-        removed.push(specks);
-    }
-    treated.iter().for_each(|line| tell!("{line}"));
-    lines(&refusals, args.rescue).iter().for_each(|line| tell!("{line}"));
-    tell!("{} written, {rejected} rejected", count(rows.len(), "grain"));
-    if rows.is_empty() {
-        let message = "no label of the image gives a valid grain";
-        return Err(Exit::with_hint(BAD_INPUT, message, advice));
-    }
-    if let Some(advice) = advice {
-        tell!("note: {advice}");
-    }
-    let cut = shared.iter().filter(|part| **part > MUCH_SHARED).count();
-    if cut > 0 && !args.no_roundness {
-        tell!(
-            "note: {cut} of {} grains were cut from neighbours over more than {:.0} % of their surface (shared_surface in {}); their roundness is measured away from the cuts, and missing where too little surface remains",
-            rows.len(),
-            100.0 * MUCH_SHARED,
-            table_file.display()
-        );
-    }
-    write_table(&table_file, &rows, &[("shared_surface", shared), ("specks_removed", removed)])?;
-    drawn::save(&sheet, pictures, SHEET.1)?;
-    labels.save_labels(&image)?;
-    Ok(())
 }
