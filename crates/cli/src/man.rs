@@ -2,6 +2,8 @@
 
 use clap::{Command, CommandFactory};
 use clap_mangen::Man;
+use grainwake_formats::disk;
+use grainwake_report::write_file;
 
 use crate::args::{Cli, ManArgs};
 use crate::exit::Exit;
@@ -14,11 +16,11 @@ pub fn man(args: &ManArgs) -> Result<(), Exit> {
     let Some(folder) = &args.output else {
         return write(&page(command)?);
     };
-    std::fs::create_dir_all(folder).map_err(Exit::at(folder))?;
+    disk::create_folder(folder).map_err(Exit::at(folder))?;
     let pages = pages(command);
     for command in &pages {
         let path = folder.join(format!("{}.1", name(command)));
-        std::fs::write(&path, page(command.clone())?).map_err(Exit::at(&path))?;
+        write_file(&path, &page(command.clone())?).map_err(Exit::at(&path))?;
     }
     print(&format!("{} pages in {}", pages.len(), folder.display()))
 }

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use grainwake_formats::disk;
 use grainwake_plot::{Figure, plain};
-use grainwake_report::write_figure;
+use grainwake_report::{write_figure, write_file};
 use grainwake_validation::Suite;
 
 use super::saved::Saved;
@@ -15,7 +16,7 @@ use crate::tell;
 /// figure does not replace an existing one.
 pub fn add(folder: &Path, suites: &[Suite], output: &Path, saved: &Saved) -> Result<usize, Exit> {
     let place = folder.join("figures");
-    std::fs::create_dir_all(&place).map_err(Exit::at(&place))?;
+    disk::create_folder(&place).map_err(Exit::at(&place))?;
     let mut count = 0;
     for suite in suites {
         for figure in &suite.figures {
@@ -60,5 +61,5 @@ pub fn list(folder: &Path, suites: &[Suite]) -> Result<(), Exit> {
         }
     }
     let page = place.join("README.md");
-    std::fs::write(&page, text).map_err(Exit::at(&page))
+    write_file(&page, text.as_bytes()).map_err(Exit::at(&page))
 }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use grainwake_formats::disk::{self, write_atomically};
 use grainwake_formats::summary::Summary;
+use grainwake_report::write_file;
 use grainwake_run::case::Case;
 use grainwake_run::provenance::Provenance;
 use grainwake_validation::{CheckResult, Suite};
@@ -100,10 +102,13 @@ pub fn add(
         }
     }
     saved.runs.sort_by_key(|r| place(suites, &r.name, &r.run));
-    std::fs::create_dir_all(folder).map_err(Exit::at(folder))?;
-    std::fs::write(&json, serde_json::to_string_pretty(&saved)? + "\n").map_err(Exit::at(&json))?;
+    disk::create_folder(folder).map_err(Exit::at(folder))?;
+    let text = serde_json::to_string_pretty(&saved)? + "\n";
+    // The file holds the results of hours: it reaches the disk before it replaces the earlier one.
+    let written = write_atomically(&json, true, |out| out.write_all(text.as_bytes()));
+    written.map_err(Exit::at(&json))?;
     let page = folder.join(format!("{level}.md"));
-    std::fs::write(&page, markdown(level, &saved)).map_err(Exit::at(&page))?;
+    write_file(&page, markdown(level, &saved).as_bytes()).map_err(Exit::at(&page))?;
     Ok(saved)
 }
 
@@ -144,4 +149,42 @@ fn markdown(level: &str, saved: &Saved) -> String {
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use grainwake_formats::disk::faults::{Fault, inject};
+
+    use super::*;
+
+    #[test]
+    fn a_full_disk_keeps_the_earlier_results() {
+        let folder = tempfile::tempdir().unwrap();
+        let save = |run: &str| {
+            let result = serde_json::json!({
+                "name": "fall", "run": run, "quantity": "speed", "bound": "", "pass": true,
+            });
+            let result: CheckResult = serde_json::from_value(result).unwrap();
+            add(folder.path(), "full", &[result], folder.path(), &[])
+        };
+        let [json, page] = ["full.json", "full.md"].map(|name| folder.path().join(name));
+        save("slow").unwrap();
+        let [results, text] = [&json, &page].map(|path| std::fs::read(path).unwrap());
+        for at in 0.. {
+            let planned = inject(folder.path(), Fault::Full, at);
+            let done = save("fast");
+            let struck = planned.struck();
+            drop(planned);
+            let Some(struck) = struck else {
+                done.unwrap();
+                // Folder, results, page.
+                assert!(at >= 1 + 4 + 3, "only {at} changes can be made to fail");
+                break;
+            };
+            assert!(done.is_err(), "{struck}");
+            assert_eq!(std::fs::read(&page).unwrap(), text, "{struck}");
+            let kept = std::fs::read(&json).unwrap();
+            assert!(kept == results || struck.contains("full.md"), "{struck}");
+        }
+    }
 }
