@@ -1,6 +1,7 @@
 //! Exit codes and error messages.
 
 use std::io::ErrorKind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -27,6 +28,18 @@ pub fn exit_code(kind: FailureKind) -> u8 {
         FailureKind::Computation => COMPUTATION,
         FailureKind::InputOutput => IO,
     }
+}
+
+/// Runs a command; a panic becomes a failure with the exit code of an internal error. The panic has
+/// printed its own message before.
+pub fn without_panic(command: impl FnOnce() -> Result<(), Exit>) -> Result<(), Exit> {
+    // Nothing that the command has changed is used after a panic.
+    catch_unwind(AssertUnwindSafe(command)).unwrap_or_else(|_| {
+        let message = "internal error: the message above names a defect of Grainwake";
+        let issues = concat!(env!("CARGO_PKG_REPOSITORY"), "/issues");
+        let help = format!("please report it with the command and the message: {issues}");
+        Err(Exit::with_help(COMPUTATION, message, help))
+    })
 }
 
 /// Failure of a command.
@@ -204,5 +217,20 @@ impl From<std::io::Error> for Exit {
 impl From<serde_json::Error> for Exit {
     fn from(error: serde_json::Error) -> Exit {
         Exit::new(IO, error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_internal_error() {
+        let exit = without_panic(|| panic!("planned by a test")).unwrap_err();
+        assert_eq!(exit.code, 3);
+        let message = exit.messages();
+        assert!(message.contains("internal error") && message.contains("/issues"), "{message}");
+        assert!(without_panic(|| Ok(())).is_ok());
+        assert_eq!(without_panic(|| Err(Exit::input("bad"))).unwrap_err().code, BAD_INPUT);
     }
 }

@@ -28,10 +28,21 @@ use args::{Cli, Command};
 use out::{print, tell};
 
 fn main() -> std::process::ExitCode {
+    match exit::without_panic(command) {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(exit) => {
+            tell!("{}", exit.messages());
+            exit.code()
+        }
+    }
+}
+
+/// Executes the command of the command line.
+fn command() -> Result<(), exit::Exit> {
     let cli = Cli::read();
     signals::survive_file_size_limit();
     threads::limit_default_pool();
-    let done = match &cli.command {
+    match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Check(args) => check::check(args),
         Command::Grain(args) => grain::grain(args),
@@ -47,12 +58,5 @@ fn main() -> std::process::ExitCode {
             out::write(&script)
         }
         Command::Man(args) => man::man(args),
-    };
-    match done {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(exit) => {
-            tell!("{}", exit.messages());
-            exit.code()
-        }
     }
 }

@@ -9,7 +9,7 @@ use grainwake_run::case::{Case, Problem, Verdict, find_parent};
 use grainwake_run::number_format::quantity;
 use grainwake_run::{Ending, Existing, Options, RESOLVED};
 
-use crate::args::RunArgs;
+use crate::args::{self, RunArgs};
 use crate::exit::{Exit, INTERRUPTED, MISSED};
 use crate::out::shell_word;
 use crate::progress::{self, count};
@@ -32,7 +32,7 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         case.check_parent(&found)?;
         parent = Some(found);
     }
-    let command = std::env::args().collect();
+    let command = args::words();
     let options = Options { existing, command, threads, parent, ..Options::default() };
     let stop = Arc::new(AtomicBool::new(false));
     signals::watch_for_interrupt(stop.clone());

@@ -13,7 +13,7 @@ use grainwake_study::{
     run_state, time_steps, write_tables,
 };
 
-use crate::args::StudyArgs;
+use crate::args::{self, StudyArgs};
 use crate::exit::{BAD_INPUT, Exit, INTERRUPTED, IO, exit_code};
 use crate::out::markdown;
 use crate::progress::{clock, count, first_line};
@@ -112,7 +112,7 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
         threads: each,
         retry: args.retry,
         keep_checkpoints: args.keep_checkpoints,
-        command: std::env::args().collect(),
+        command: args::words(),
     };
     let board = Board::new(runs, &chosen, jobs, args.quiet, stop.clone());
     let ended = execute(runs, &chosen, &folder, &options, &board)?;

@@ -11,7 +11,7 @@ use grainwake_run::case::Case;
 use grainwake_run::{Ending, Existing, Observer, Options, RunError, queue};
 use grainwake_validation::{Suite, SuiteRun};
 
-use crate::args::ValidateArgs;
+use crate::args::{self, ValidateArgs};
 use crate::exit::{Exit, INTERRUPTED};
 use crate::{progress, tell, threads};
 
@@ -110,7 +110,7 @@ fn execute_one(
         tell!("{name}: {} x {} x {} cells", cells[0], cells[1], cells[2]);
     }
     let existing = if args.resume { Existing::Reuse } else { Existing::Replace };
-    let command = std::env::args().collect();
+    let command = args::words();
     let options = Options { existing, command, threads, ..Options::default() };
     let ending = if others {
         let mut notes = Notes { name, quiet: args.quiet, stop };

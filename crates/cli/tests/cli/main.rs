@@ -7,6 +7,8 @@ mod closed_pipes;
 mod commands;
 mod common;
 mod contacts;
+#[cfg(target_os = "linux")]
+mod encoding;
 mod export;
 mod film;
 mod hollow;
