@@ -1,5 +1,5 @@
-//! Changes on the disk: every file of a run or a study is created, written, synced, renamed and
-//! removed through this module, so that tests can make any of these changes fail ([`faults`]).
+//! Changes on the disk: every file is created, written, synced, renamed and removed through this
+//! module, so that tests can make any of these changes fail ([`faults`]).
 
 pub mod faults;
 
