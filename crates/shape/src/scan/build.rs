@@ -66,8 +66,11 @@ pub struct Scan {
     pub refusals: Vec<Refusal>,
 }
 
-/// Builds the shapes of the grains in a volume, ordered by label. Errors of the whole volume are
-/// returned directly, those of one grain with that grain.
+/// Builds the shapes of the grains in a volume, ordered by label.
+///
+/// # Errors
+/// Options out of their range, a volume that is empty or solid, and a label that is absent; the
+/// error of one grain is returned with that grain.
 pub fn shapes_from_volume(
     volume: &Volume,
     source: &SourceFile,
@@ -77,6 +80,9 @@ pub fn shapes_from_volume(
 }
 
 /// Builds the shapes of the grains and the label image, and reports progress.
+///
+/// # Errors
+/// As [`shapes_from_volume`].
 pub fn scan_volume(
     volume: &Volume,
     source: &SourceFile,

@@ -11,13 +11,20 @@ type Reader = fn(&Path, &[u8], &ReadLimits) -> Result<(Volume, Option<StatedVoxe
 
 /// Reads a 3-D image: a multi-page TIFF (8, 16 or 32 bits, integer or floating-point, including
 /// BigTIFF), a folder of TIFF slices, an NPY array indexed [z][y][x], an NPZ archive with one
-/// array, NRRD or MetaImage (with voxels inside, or raw in a separate file). Voxels that are not
-/// cubes are refused. If the axes of a header are left-handed, the x axis is reversed.
+/// array, NRRD or MetaImage (with voxels inside, or raw in a separate file). If the axes of a
+/// header are left-handed, the x axis is reversed.
+///
+/// # Errors
+/// The file cannot be read, exceeds the limits, has no format of the list, is damaged, or has
+/// voxels that are not cubes.
 pub fn read_volume(path: &Path, limits: &ReadLimits) -> Result<(Volume, SourceFile)> {
     read_volume_and_voxel(path, limits).map(|(volume, source, _)| (volume, source))
 }
 
 /// Reads a 3-D image as [`read_volume`] does, and the edge length of a voxel if the file states it.
+///
+/// # Errors
+/// As [`read_volume`].
 pub fn read_volume_and_voxel(
     path: &Path,
     limits: &ReadLimits,

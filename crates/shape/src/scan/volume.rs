@@ -61,8 +61,10 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Creates a volume of labels, x fastest; refuses a number of values that does not match the
-    /// dimensions.
+    /// Creates a volume of labels, x fastest.
+    ///
+    /// # Errors
+    /// A number of labels other than the product of the dimensions.
     pub fn from_labels(dims: [usize; 3], labels: Vec<u32>) -> Result<Volume> {
         if dims.iter().try_fold(1usize, |n, d| n.checked_mul(*d)) != Some(labels.len()) {
             let (name, count) = ("number of voxels", labels.len() as f64);
