@@ -70,8 +70,8 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// Length [m].
-    Length(0, 1, 0, 0) "a length", "m", 1e9, "2 mm";
+    /// Length [m]; grains and boxes have bounds of their own.
+    Length(0, 1, 0, 0) "a length", "m", (f64::MAX), "2 mm";
     /// Time [s].
     Time(0, 0, 1, 0) "a time", "s", 1e12, "5 ms";
     /// Density [kg/m^3].
