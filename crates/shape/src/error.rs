@@ -111,8 +111,10 @@ pub enum ShapeError {
         volume: f64,
     },
     /// The finished shape failed the quality check.
-    #[error("the shape fails the quality check: {reason}")]
+    #[error("{}the shape fails the quality check: {reason}", prefix(file))]
     Quality {
+        /// File of the shape; empty for one in memory.
+        file: String,
         /// Kind of the defect.
         defect: Defect,
         /// The bound, and the value that exceeds it.
@@ -153,6 +155,9 @@ impl ShapeError {
             ShapeError::InsideOut { volume, .. } => {
                 ShapeError::InsideOut { file: file.to_owned(), volume }
             }
+            ShapeError::Quality { defect, reason, cells, .. } => {
+                ShapeError::Quality { file: file.to_owned(), defect, reason, cells }
+            }
             other => other,
         }
     }
@@ -162,7 +167,7 @@ impl ShapeError {
     }
     pub(crate) fn quality(defect: Defect, reason: impl Into<String>) -> ShapeError {
         let reason = reason.into();
-        ShapeError::Quality { defect, reason, cells: None }
+        ShapeError::Quality { file: String::new(), defect, reason, cells: None }
     }
 }
 

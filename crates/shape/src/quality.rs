@@ -32,7 +32,7 @@ impl Default for QualityBounds {
 
 impl QualityBounds {
     pub(crate) fn check(&self, quality: &Quality) -> Result<()> {
-        let gradient = "the 0.9 quantile of | |grad phi| - 1 | at the surface";
+        let gradient = "the error of the distance gradient at the surface (0.9 quantile)";
         let volume = "the relative difference of volume from the source";
         let measured = [
             (Defect::Gradient, gradient, Some(quality.gradient_error), self.gradient_error),

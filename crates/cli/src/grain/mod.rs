@@ -66,7 +66,9 @@ fn plausible(shape: &Shape, option: &str) -> Result<(), Exit> {
     let help = format!(
         "check the unit of {option} (mm or m?), or set the size with --equivalent-diameter LENGTH"
     );
-    check_grain_size(shape).map_err(|message| Exit::refused(message, help))
+    let source = &shape.provenance().source;
+    let name = if source.is_empty() { String::new() } else { format!("{source}: ") };
+    check_grain_size(shape).map_err(|message| Exit::refused(format!("{name}{message}"), help))
 }
 
 /// Parses `--equivalent-diameter` [m], before the work starts.

@@ -175,7 +175,7 @@ fn millimetres_for_metres() {
     refused_mesh(
         &large,
         "1 m",
-        &["equivalent diameter of 2.481", "check the unit of --unit", "1 um to 1 m"],
+        &["body.stl: the grain has an equivalent diameter of 2.481", "of --unit", "1 um to 1 m"],
     );
     let small: Vec<Face> = cube().iter().map(|f| f.map(|p| p.map(|x| 2e-4 * x))).collect();
     refused_mesh(&small, "1 mm", &["of 0.2481", "check the unit of --unit"]);

@@ -46,7 +46,9 @@ pub fn shape_from_mesh(
     };
     closed.check_crossings().map_err(|error| error.in_file(&source.path.to_string_lossy()))?;
     let built = from_closed(closed, Surface::Exact, provenance.clone(), &options.shape);
-    built.map_err(|error| with_enough_cells(error, closed, &options.shape))
+    built.map_err(|error| {
+        with_enough_cells(error, closed, &options.shape).in_file(&source.path.to_string_lossy())
+    })
 }
 
 /// Numbers of cells that are tried on a mesh that a given number resolves too poorly, relative to
@@ -55,7 +57,7 @@ const MORE: [f64; 4] = [1.25, 1.5, 2.0, 3.0];
 
 /// Completes the error of a mesh that fails the quality check by the number of cells that passes.
 fn with_enough_cells(error: ShapeError, mesh: &TriangleMesh, given: &ShapeOptions) -> ShapeError {
-    let ShapeError::Quality { defect, reason, .. } = error else {
+    let ShapeError::Quality { file, defect, reason, .. } = error else {
         return error;
     };
     let present = given.cells.unwrap_or(DEFAULT_CELLS) as f64;
@@ -64,7 +66,7 @@ fn with_enough_cells(error: ShapeError, mesh: &TriangleMesh, given: &ShapeOption
         from_closed(mesh, Surface::Exact, Provenance::new("mesh"), &more).is_ok()
     };
     let cells = MORE.map(|share| (share * present).ceil() as usize).into_iter().find(passes);
-    ShapeError::Quality { defect, reason, cells }
+    ShapeError::Quality { file, defect, reason, cells }
 }
 
 /// Builds the shape of a mesh; determines its frame and bounds and completes `provenance`.
