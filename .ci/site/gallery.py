@@ -27,6 +27,7 @@ PICTURES = {
     "rebound": "results/validation/figures/wet-bounce-height.png",
     "taylor-green": "results/validation/figures/fluid-dissipation-re1600.png",
     "suspension": "runs/periodic-suspension/figures/speed.png",
+    "suspension-dense": "runs/suspension-150/figures/speed.png",
     "heap": "runs/sandpile/figures/positions.png",
     "permeability": "runs/permeability/figures/speed.png",
 }

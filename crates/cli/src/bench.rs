@@ -42,7 +42,7 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
         }
         limit_instructions(set);
     }
-    let threads = threads::resolve(args.threads);
+    let threads = threads::resolve(args.threads, false);
     let scheme = if args.scheme == "paper" { Scheme::Paper } else { Scheme::Aperture };
     let sizes = if args.scaling { CUBES.map(|n| [n; 3]).to_vec() } else { vec![[nx, ny, nz]] };
     let measured: Vec<Measured> = threads::on(threads, || {

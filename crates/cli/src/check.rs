@@ -15,7 +15,7 @@ use crate::{kind, print, threads};
 /// Checks a case and prints its derived numbers, cost and warnings.
 pub fn check(args: &CheckArgs) -> Result<(), Exit> {
     let case = kind::case(&args.case, &args.overrides)?;
-    let threads = threads::resolve(args.threads.unwrap_or(case.threads));
+    let threads = threads::resolve(args.threads.unwrap_or(case.threads), false);
     let estimate = case.estimate(threads);
     if args.json {
         print(&serde_json::to_string(&estimate)?)?;

@@ -19,7 +19,7 @@ use crate::{check, expect, kind, print, signals, tell, threads};
 pub fn run(args: &RunArgs) -> Result<(), Exit> {
     let case = kind::case(&args.case, &args.overrides)?;
     let out = args.output.clone().unwrap_or_else(|| default_folder(&args.case));
-    let threads = threads::resolve(args.threads.unwrap_or(case.threads));
+    let threads = threads::resolve(args.threads.unwrap_or(case.threads), args.quiet);
     let existing = match (args.resume, args.resume_or_start, args.force) {
         (true, ..) => Existing::Resume,
         (_, true, _) => Existing::ResumeOrStart,

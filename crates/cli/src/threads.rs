@@ -3,9 +3,13 @@
 use crate::exit::Exit;
 use crate::tell;
 
-/// Returns the number of threads; warns if it is reduced.
-pub fn resolve(threads: usize) -> usize {
-    grainwake_run::threads::resolve(threads, warn)
+/// Returns the number of threads; unless `quiet`, warns if it is reduced.
+pub fn resolve(threads: usize, quiet: bool) -> usize {
+    grainwake_run::threads::resolve(threads, |text| {
+        if !quiet {
+            warn(text);
+        }
+    })
 }
 
 /// Returns the number of simultaneous runs and the threads of each; warns if they are reduced.

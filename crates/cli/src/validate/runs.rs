@@ -35,7 +35,7 @@ pub fn execute(
     ended: impl FnMut(&ChosenRun, Result<(), String>) + Send,
 ) -> Result<(), Exit> {
     let (jobs, threads) = match args.jobs.min(runs.len()) {
-        0 | 1 => (1, threads::resolve(args.threads)),
+        0 | 1 => (1, threads::resolve(args.threads, false)),
         jobs => threads::share(jobs, args.threads),
     };
     let done = Mutex::new(InOrder { runs, ended, waiting: BTreeMap::new(), following: 0 });

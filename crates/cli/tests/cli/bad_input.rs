@@ -170,6 +170,8 @@ fn thousands_of_threads_are_reduced_with_a_warning() {
     program.arg("run").arg(&case).args(["--threads", "5000", "--set", "time.end=2 ms", "-o"]);
     let done = program.arg(&out).arg("--no-report").assert().success();
     done.stderr(contains("warning: 5000 threads are too many for"));
+    let silent = program.args(["--force", "--quiet"]).assert().success();
+    silent.stderr(contains("too many").not());
 }
 
 #[test]
