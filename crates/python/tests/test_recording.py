@@ -42,6 +42,19 @@ def test_without_control_the_folder_has_the_bits_of_the_command_line(
     assert "controlled_from" not in gw.open(folder).provenance
 
 
+def test_a_time_beside_an_output_takes_no_short_step(tmp_path):
+    grain = gw.Grain.sphere("2 mm").at(["3 mm", "3 mm", "4 mm"], density=1500)
+    case = gw.Case.new(
+        size=["6 mm"] * 3, cell_size="0.25 mm", end="20 ms", grains=[grain],
+        fluid={"density": 1000, "viscosity": "10 mPa s"}, output={"tables": "3.3333 ms"},
+    )
+    with gw.Simulation(case, output=tmp_path / "run") as sim:
+        states = list(sim.run(every=1 / 300, progress=False))
+    assert [state.time for state in states] == pytest.approx([n / 300 for n in range(7)])
+    times = gw.open(tmp_path / "run").grain(0)["time"]
+    assert list(times) == pytest.approx([n / 300 for n in range(7)], abs=1e-6)
+
+
 def test_control_shows_in_the_tables(case, run, tmp_path):
     with gw.Simulation(case, output=tmp_path / "run") as sim:
         sim.advance_to("10 ms")

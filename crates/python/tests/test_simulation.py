@@ -71,6 +71,7 @@ def test_steps_and_times_are_checked(sim):
     assert sim.step(horizon="1 ms") <= 1e-3
     for call, words in [
         (lambda: sim.step(horizon=0), "expected a positive time"),
+        (lambda: sim.step(horizon=1e-9), "expected at least .* s, a thousandth of the last step"),
         (lambda: sim.advance_to("2 mm"), "is a length"),
         (lambda: sim.run(every=-1), "expected a positive time"),
         (lambda: sim.run(until=-1), "until: found -1 s, which is before the present time"),
@@ -79,6 +80,13 @@ def test_steps_and_times_are_checked(sim):
     ]:
         with pytest.raises(gw.CaseError, match=words):
             call()
+
+
+def test_a_time_just_ahead_is_reached(sim):
+    sim.advance_to("1 ms")
+    time, steps = sim.time, sim.steps
+    sim.advance_to(time * (1 + 1e-8))
+    assert (sim.time, sim.steps) == (time, steps)
 
 
 def test_a_run_may_end_at_the_present_time(sim):

@@ -153,9 +153,10 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Returns the time from `now` to the next output or the end [s]; `step` [s] is the usual step.
-    pub fn until_next(&self, now: f64, step: f64) -> f64 {
-        series::until_next(&self.series, self.end, now, step)
+    /// Returns the time from `now` to the next output, to the end or to the time `wanted` by the
+    /// caller [s]; `step` [s] is the usual step.
+    pub fn until_next(&self, wanted: f64, now: f64, step: f64) -> f64 {
+        series::until_next(&self.series, [self.end, wanted], now, step)
     }
 
     /// Updates the record with the state after a step, writes the outputs that are due, and returns

@@ -244,12 +244,13 @@ impl Recording {
 
     /// Takes one time step, writes the outputs and the checkpoint that are due, and returns the new
     /// events. A whole number of equal steps ends at the next output or `horizon` [s] from now,
-    /// whichever is earlier.
+    /// whichever is earlier; if they are less than a tenth of a step apart, at the later of both.
     ///
     /// # Errors
     /// [`RunError`]; the last valid checkpoint is kept.
     pub fn step(&mut self, sim: &mut Simulation, horizon: f64) -> Result<Vec<Event>, RunError> {
-        let limit = self.recorder.until_next(sim.time(), sim.time_step()).min(horizon);
+        let wanted = sim.time() + horizon;
+        let limit = self.recorder.until_next(wanted, sim.time(), sim.time_step());
         let stepped = sim.step(limit).and_then(|()| self.collapsed(sim, limit));
         if let Err(source) = stepped {
             return Err(self.failed(sim, source));

@@ -71,14 +71,15 @@ impl Series {
     }
 }
 
-/// Returns the time from `now` to the next output of any series or to `end` [s].
+/// Returns the time from `now` to the next output of any series, to `end` or to the time `wanted`
+/// by the caller [s].
 ///
-/// Outputs that are nearly due at the same time are written together at the last of them: a time
-/// step much shorter than the usual `step` [s] disturbs the pressure. A continued run may ask for
-/// intervals shorter than the last step; two outputs of one series are never written together.
-pub(crate) fn until_next(series: &[Series], end: f64, now: f64, step: f64) -> f64 {
+/// Times that are nearly the same are one time, the last of them: a time step much shorter than the
+/// usual `step` [s] disturbs the pressure. A continued run may ask for intervals shorter than the
+/// last step; two outputs of one series are never written together.
+pub(crate) fn until_next(series: &[Series], [end, wanted]: [f64; 2], now: f64, step: f64) -> f64 {
     let times = || {
-        let next = series.iter().filter_map(Series::next_time);
+        let next = series.iter().filter_map(Series::next_time).chain([wanted]);
         next.filter(|time| *time < end).chain([end])
     };
     let first = times().fold(f64::INFINITY, f64::min);
@@ -95,9 +96,14 @@ mod tests {
     fn outputs_closer_than_the_last_step_are_written_one_by_one() {
         let of = |content, interval| Series { content, interval, next: 1 };
         let series = [of(Content::Tables, 1e-3), of(Content::Slices, 0.5e-3)];
-        assert_eq!(until_next(&series, 1.0, 0.0, 0.1), 0.5e-3);
+        let until = |series: &[Series], wanted, step| until_next(series, [1.0, wanted], 0.0, step);
+        assert_eq!(until(&series, f64::INFINITY, 0.1), 0.5e-3);
         // Nearly equal times are written together.
         let series = [of(Content::Tables, 1e-3), of(Content::Slices, 1.01e-3)];
-        assert_eq!(until_next(&series, 1.0, 0.0, 1e-3), 1.01e-3);
+        assert_eq!(until(&series, f64::INFINITY, 1e-3), 1.01e-3);
+        // A time that the caller wants is one of them, before or after an output.
+        assert_eq!(until(&series[..1], 0.9999e-3, 1e-3), 1e-3);
+        assert_eq!(until(&series[..1], 1.0001e-3, 1e-3), 1.0001e-3);
+        assert_eq!(until(&series[..1], 0.7e-3, 1e-3), 0.7e-3);
     }
 }

@@ -126,6 +126,36 @@ fn a_velocity_set_after_an_impact_is_that_at_the_start_of_the_next_step() {
 }
 
 #[test]
+fn velocities_stay_in_the_plane_of_a_flat_flow() {
+    let sphere = Grain::new(Shape::sphere(0.5e-3, 300), 2500.0);
+    let flat = Setup::new(Mesh::cubic([16, 1, 24], 0.125e-3))
+        .with_boundaries([[Boundary::WALL; 2], [Boundary::Periodic; 2], [Boundary::WALL; 2]])
+        .with_fluid(FluidParams::new(1000.0, 1e-6))
+        .with_grains([sphere.with_position(DVec3::new(1e-3, 0.0625e-3, 2e-3))]);
+    let mut sim = Simulation::new(flat).unwrap();
+    for (component, velocity, quantity) in [
+        (TRANSLATION, DVec3::new(0.0, 0.1, 0.0), "velocity"),
+        (ROTATION, DVec3::new(5.0, 1.0, 0.0), "angular velocity"),
+    ] {
+        let refused = sim.set_velocity(0, component, velocity).unwrap_err();
+        assert_eq!(refused, ControlError::OutOfPlane { grain: 0, quantity, normal: 1 });
+    }
+    sim.set_velocity(0, TRANSLATION, DVec3::new(0.1, 0.0, -0.1)).unwrap();
+    sim.set_velocity(0, ROTATION, DVec3::new(0.0, -5.0, 0.0)).unwrap();
+}
+
+#[test]
+fn a_time_closer_than_a_thousandth_of_a_step_is_reached() {
+    let mut sim = Simulation::new(setup()).unwrap();
+    sim.advance_to(1e-3).unwrap();
+    let steps = sim.steps();
+    sim.advance_to(1e-3 + 0.9 * sim.least_horizon()).unwrap();
+    assert_eq!(sim.steps(), steps);
+    sim.advance_to(1e-3 + 1.1 * sim.least_horizon()).unwrap();
+    assert_eq!(sim.steps(), steps + 1);
+}
+
+#[test]
 fn unknown_grains_and_infinite_values_are_refused() {
     let mut sim = Simulation::new(setup()).unwrap();
     let no_grain = ControlError::NoGrain { grain: 1, count: 1 };

@@ -218,9 +218,10 @@ impl PySimulation {
     }
 }
 
-/// Returns the time from now until `end` [s]; none if it has passed.
+/// Returns the time from now until `end` [s]; none if it has passed, or is too near for a step.
 fn left(sim: &Simulation, end: f64) -> Option<f64> {
-    (sim.time() < end * (1.0 - SAME_TIME)).then(|| end - sim.time())
+    let left = end - sim.time();
+    (left >= (SAME_TIME * end).max(sim.least_horizon()) && left > 0.0).then_some(left)
 }
 
 /// Returns the stop condition of the case, if it holds.
@@ -274,7 +275,8 @@ impl PySimulation {
     /// Parameters
     /// ----------
     /// horizon : float or str, optional
-    ///     Time from now [s] at which a whole number of equal steps ends.
+    ///     Time from now [s] at which a whole number of equal steps ends, at least a thousandth of
+    ///     the last step: a shorter step would disturb pressure and forces.
     ///
     /// Returns
     /// -------
@@ -283,6 +285,8 @@ impl PySimulation {
     ///
     /// Raises
     /// ------
+    /// CaseError
+    ///     The horizon is not positive, or too short.
     /// SolverError
     ///     The state is no longer finite or changes too fast.
     /// BufferError
@@ -296,6 +300,14 @@ impl PySimulation {
         }
         let mut steps = std::iter::once(horizon);
         let mut this = changing(slf)?;
+        let least = this.sim.least_horizon();
+        if horizon < least {
+            let [found, least] = [horizon, least].map(|time| seconds(time, "s"));
+            return Err(input(format!(
+                "horizon: found {found}; expected at least {least}, a thousandth of the last step \
+                 (advance_to takes such a time as reached)"
+            )));
+        }
         this.advance(slf.py(), |_, _| steps.next())?;
         Ok(this.sim.time_step())
     }
@@ -305,7 +317,9 @@ impl PySimulation {
     /// Parameters
     /// ----------
     /// time : float or str
-    ///     Simulated time [s]; nothing happens if it has passed.
+    ///     Simulated time [s]; nothing happens if it has passed, or is less than a thousandth of
+    ///     the last step away. With a run folder, a time less than a tenth of a step before an
+    ///     output is that of the output.
     ///
     /// Raises
     /// ------

@@ -45,6 +45,19 @@ pub enum ControlError {
         /// "velocity", "angular velocity".
         quantity: &'static str,
     },
+    /// The velocity leads out of the plane of a flow that has one cell along an axis.
+    #[error(
+        "the {quantity} of grain {grain} leads out of the plane of the flow, which has one cell along {}",
+        ["x", "y", "z"][*normal]
+    )]
+    OutOfPlane {
+        /// Index of the grain.
+        grain: usize,
+        /// "velocity", "angular velocity".
+        quantity: &'static str,
+        /// Axis of one cell.
+        normal: usize,
+    },
     /// A grain so light would become unstable if it moved freely.
     #[error(
         "grain {grain} is lighter than {LIGHTEST_FREE_GRAIN} times the fluid and would become unstable; keep its velocity prescribed"
@@ -108,8 +121,8 @@ impl Simulation {
     /// momentum of the change, and shares it with its added mass in the next step, as after a blow.
     ///
     /// # Errors
-    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite
-    /// or prescribed.
+    /// [`ControlError`] for a grain that is unknown or has left, or a velocity that is not finite,
+    /// prescribed, or out of the plane of a flat flow.
     pub fn set_velocity(
         &mut self,
         grain: usize,
@@ -120,6 +133,13 @@ impl Simulation {
         self.check_control(grain, velocity.is_finite(), quantity)?;
         if *component.of(&mut self.setup.grains[grain]).0 != MotionConstraint::Free {
             return Err(ControlError::Prescribed { grain, quantity });
+        }
+        let in_plane = |normal: &usize| match component {
+            MotionComponent::Translation => velocity[*normal] == 0.0,
+            MotionComponent::Rotation => velocity == velocity.project_onto(DVec3::AXES[*normal]),
+        };
+        if let Some(normal) = self.setup.flat_axis().filter(|normal| !in_plane(normal)) {
+            return Err(ControlError::OutOfPlane { grain, quantity, normal });
         }
         self.replace_velocity(grain, component, velocity);
         Ok(())

@@ -16,17 +16,25 @@ impl Simulation {
         if !time.is_finite() {
             return Err(AdvanceError::NotFinite { time });
         }
-        while self.clock.time < time * (1.0 - SAME_TIME) {
+        while self.clock.time < time * (1.0 - SAME_TIME)
+            && time - self.clock.time >= self.least_horizon()
+        {
             self.step(time - self.clock.time)?;
         }
         Ok(())
     }
 
+    /// Shortest horizon of a step [s], a thousandth of the last step: a shorter step disturbs the
+    /// pressure and the loads, since the velocity that the last step left in the grains is removed
+    /// in a shorter time.
+    pub fn least_horizon(&self) -> f64 {
+        1e-3 * self.clock.last_step
+    }
+
     /// Advances the simulation by one time step. Its length is chosen by the
     /// [`StepRule`](super::StepRule) and such that a whole number of equal steps ends `horizon` [s]
     /// from now, which makes output times exact; an infinite horizon imposes no such condition. A
-    /// horizon below a thousandth of the last step disturbs the pressure and the loads for some
-    /// steps: the velocity that the last step left in the grains is removed in a shorter time.
+    /// horizon should be at least [`Self::least_horizon`].
     ///
     /// # Panics
     /// If `horizon` is not positive.
