@@ -60,7 +60,11 @@ def main():
         with Image.open(ROOT / source) as picture:
             picture = picture.convert("RGB")
             picture.thumbnail((SIZE, SIZE), Image.Resampling.LANCZOS)
-            picture.save(TARGET / f"{name}.jpg", quality=82, optimize=True, progressive=True)
+            path = TARGET / f"{name}.jpg"
+            for quality in (82, 75, 68):
+                picture.save(path, quality=quality, optimize=True, progressive=True)
+                if path.stat().st_size <= LIMIT:
+                    break
 
 
 if __name__ == "__main__":
