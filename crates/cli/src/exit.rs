@@ -135,6 +135,7 @@ impl From<CaseError> for Exit {
                 Exit::with_help(code, error.to_string(), help)
             }
             CaseError::Invalid(problems) => Exit::problems(BAD_INPUT, problems),
+            CaseError::Interrupted => Exit::new(INTERRUPTED, error.to_string()),
         }
     }
 }

@@ -1,23 +1,23 @@
 //! `Case`: a validated case.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
-use grainwake_run::case::{Case, ShapeFile, schema};
+use grainwake_run::case::{Case, CaseError, schema};
 use grainwake_run::number_format::number_of_grains;
 use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList, PyString};
+use pyo3::types::{PyDict, PyList};
 
 use crate::arguments::{Whole, whole};
 use crate::arrays::json;
 use crate::case_dict::{override_list, to_toml};
-use crate::error::{IntoException, Raise, input, refused_dict, system};
+use crate::error::{IntoException, Raise, refused_dict, system};
 use crate::grain::PyGrain;
+use crate::running::interruptible;
 use crate::{running, threads};
 
-/// Constructor of a pickled case and its arguments.
-type Reduced<'py> = (Bound<'py, PyAny>, (String, Vec<(String, Bound<'py, PyBytes>)>));
+/// Name of the text of a dict in messages.
+pub const DICT: &str = "dict";
 
 /// Case: grains, fluid, box and outputs, read and validated.
 ///
@@ -79,8 +79,8 @@ impl PyCase {
         path: PathBuf,
         overrides: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyCase> {
-        let set = override_list(overrides)?;
-        let case = py.detach(|| Case::load(&path, &set)).raise()?;
+        let set = override_list(overrides, None)?;
+        let case = interruptible(py, |stop| Case::load_until(&path, &set, stop))?.raise()?;
         Ok(PyCase { case })
     }
 
@@ -100,6 +100,10 @@ impl PyCase {
     /// Returns
     /// -------
     /// Case
+    ///
+    /// See Also
+    /// --------
+    /// with_overrides : another case with the grains of this one.
     #[staticmethod]
     #[pyo3(signature = (text, folder = PathBuf::from("."), overrides = None, *, name = "case"))]
     fn from_toml(
@@ -109,8 +113,9 @@ impl PyCase {
         overrides: Option<&Bound<'_, PyAny>>,
         name: &str,
     ) -> PyResult<PyCase> {
-        let set = override_list(overrides)?;
-        let case = py.detach(|| Case::parse(text, name, &folder, &set)).raise()?;
+        let set = override_list(overrides, None)?;
+        let read = |stop: &_| Case::parse_until(text, name, &folder, &set, stop);
+        let case = interruptible(py, read)?.map_err(without_files).raise()?;
         Ok(PyCase { case })
     }
 
@@ -136,133 +141,20 @@ impl PyCase {
     ///     The contents are wrong; the message quotes the TOML form of the dict.
     #[staticmethod]
     #[pyo3(signature = (tables, folder = PathBuf::from("."), overrides = None))]
-    fn from_dict(
+    pub fn from_dict(
         py: Python<'_>,
         tables: &Bound<'_, PyDict>,
         folder: PathBuf,
         overrides: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyCase> {
-        let set = override_list(overrides)?;
+        let set = override_list(overrides, None)?;
         // The case keeps the contents of the grain files, so that the folder is not needed later.
-        let store = tempfile::tempdir().map_err(|e| system(e.kind(), e.to_string()))?;
+        let store = grain_store()?;
         let text = to_toml(tables, store.path())?;
         let folder = std::path::absolute(&folder).unwrap_or(folder);
-        let case = py.detach(|| Case::parse(&text, "dict", &folder, &set));
+        let read = |stop: &_| Case::parse_until(&text, DICT, &folder, &set, stop);
+        let case = interruptible(py, read)?;
         Ok(PyCase { case: case.map_err(|error| refused_dict(&error))? })
-    }
-
-    /// Build a case from the values that are given most often.
-    ///
-    /// Parameters
-    /// ----------
-    /// size : sequence of float or str
-    ///     Edge lengths of the box [m].
-    /// cell_size : float, str or sequence
-    ///     Edge of a cell [m], one or one per axis.
-    /// refinement : int, optional
-    ///     2 halves the cells in a box that follows the grains; 1 by default.
-    /// refinement_margin : float, str or sequence, optional
-    ///     Least distance from the grains to the sides of that box [m], one or one per axis; 0.4
-    ///     equivalent diameters by default.
-    /// end : float or str
-    ///     End of the run [s].
-    /// grains : sequence of dict, default ()
-    ///     Entries of the list ``grain``, such as those of `Grain.at`.
-    /// fluid : dict, optional
-    ///     Table ``fluid``: density and viscosity or kinematic_viscosity. Without it the run is
-    ///     dry.
-    /// gravity : sequence of float or str, optional
-    ///     Gravity [m/s2]; (0, 0, -9.81) by default.
-    /// boundaries : dict, optional
-    ///     Table ``domain.boundaries``; walls by default.
-    /// title : str, optional
-    ///     One line that says what the case is.
-    /// folder : path-like, default "."
-    ///     Folder that grain files are relative to.
-    /// **tables
-    ///     Further tables: contact, coupling, output, run, expect, and the lists packing, poses
-    ///     and probe; a dict ``time`` is joined with `end`.
-    ///
-    /// Returns
-    /// -------
-    /// Case
-    #[staticmethod]
-    #[pyo3(signature = (*, size, cell_size, end, refinement = None, refinement_margin = None, grains = None, fluid = None, gravity = None, boundaries = None, title = None, folder = PathBuf::from("."), **tables))]
-    fn new(
-        py: Python<'_>,
-        size: &Bound<'_, PyAny>,
-        cell_size: &Bound<'_, PyAny>,
-        end: &Bound<'_, PyAny>,
-        refinement: Option<Whole>,
-        refinement_margin: Option<&Bound<'_, PyAny>>,
-        grains: Option<&Bound<'_, PyAny>>,
-        fluid: Option<&Bound<'_, PyAny>>,
-        gravity: Option<&Bound<'_, PyAny>>,
-        boundaries: Option<&Bound<'_, PyAny>>,
-        title: Option<&str>,
-        folder: PathBuf,
-        tables: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<PyCase> {
-        let domain = PyDict::new(py);
-        domain.set_item("size", size)?;
-        domain.set_item("cell_size", cell_size)?;
-        domain.set_item("refinement", whole::<i64>("refinement", refinement.as_ref(), 1)?)?;
-        domain.set_item("refinement_margin", refinement_margin)?;
-        domain.set_item("boundaries", boundaries)?;
-        let time = PyDict::new(py);
-        time.set_item("end", end)?;
-        let all = PyDict::new(py);
-        all.set_item("title", title)?;
-        all.set_item("gravity", gravity)?;
-        all.set_item("fluid", fluid)?;
-        all.set_item("domain", domain)?;
-        all.set_item("grain", grains)?;
-        for (name, table) in tables.into_iter().flatten() {
-            match name.cast::<PyString>()?.to_str()? {
-                "domain" => {
-                    let message = "domain: its keys are arguments of their own, such as size; a \
-                                   case with other keys is made by from_dict";
-                    return Err(input(message));
-                }
-                "grain" if grains.is_some() => {
-                    return Err(input("grain: found beside grains; give one of them"));
-                }
-                "time" => match table.cast::<PyDict>() {
-                    Ok(more) if more.contains("end")? => {
-                        return Err(input("time.end: found beside end; give one of them"));
-                    }
-                    Ok(more) => time.update(more.as_mapping())?,
-                    Err(_) => {
-                        let found = table.get_type().name()?;
-                        return Err(input(format!(
-                            "time: found a value of type {found}; expected a dict"
-                        )));
-                    }
-                },
-                _ => all.set_item(name, table)?,
-            }
-        }
-        all.set_item("time", time)?;
-        PyCase::from_dict(py, &all, folder, None)
-    }
-
-    #[staticmethod]
-    fn _from_parts(
-        py: Python<'_>,
-        resolved: &str,
-        grains: Vec<(String, Vec<u8>)>,
-    ) -> PyResult<PyCase> {
-        let grains = grains.into_iter().map(|(name, bytes)| (name, Arc::new(bytes))).collect();
-        let case = py.detach(|| Case::from_resolved(resolved, grains)).raise()?;
-        Ok(PyCase { case })
-    }
-
-    /// Parts of a pickled case: its text with all defaults, and its grain files by name.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        let (py, case) = (slf.py(), &slf.get().case);
-        let file = |(name, bytes): &ShapeFile| (name.clone(), PyBytes::new(py, bytes));
-        let grains = case.shapes.iter().map(file).collect();
-        Ok((slf.get_type().getattr("_from_parts")?, (case.resolved.clone(), grains)))
     }
 
     /// JSON schema of a case file.
@@ -364,7 +256,8 @@ impl PyCase {
     fn title(&self) -> &str {
         &self.case.title
     }
-    /// Case in TOML with all defaults written out.
+    /// Case in TOML with all defaults written out. It names the grain files without their contents;
+    /// `with_overrides` varies a case, and a pickled case holds its grains.
     #[getter]
     fn resolved(&self) -> &str {
         &self.case.resolved
@@ -409,4 +302,26 @@ impl PyCase {
         let grains = number_of_grains(self.case.setup.grains.len());
         format!("Case({:?}, {grains}, {nx} x {ny} x {nz} cells)", self.case.title)
     }
+}
+
+/// Returns a folder for grains in memory. The case keeps the contents of its grain files, so that
+/// the folder is not needed later.
+pub fn grain_store() -> PyResult<tempfile::TempDir> {
+    tempfile::tempdir().map_err(|error| system(error.kind(), error.to_string()))
+}
+
+/// Adds a remedy for text such as `Case.resolved`, which names grain files without their contents.
+fn without_files(error: CaseError) -> CaseError {
+    let CaseError::Invalid(mut problems) = error else { return error };
+    for problem in &mut problems {
+        if problem.message.starts_with("there is no grain file") {
+            problem.help = Some(
+                "grain files are relative to `folder`; the text of Case.resolved names them \
+                 without their contents: vary a case with Case.with_overrides, or keep it with \
+                 pickle"
+                    .to_owned(),
+            );
+        }
+    }
+    CaseError::Invalid(problems)
 }

@@ -13,8 +13,12 @@ use grainwake_run::case::write_toml;
 /// Largest number of tables and lists inside each other.
 const DEEPEST: usize = 32;
 
-/// Returns overrides as strings in the syntax of `Case::load`; None removes a key.
-pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<String>> {
+/// Returns overrides as strings in the syntax of `Case::load`; None removes a key. Grains are
+/// written to the folder `store`, and refused without one.
+pub fn override_list(
+    overrides: Option<&Bound<'_, PyAny>>,
+    store: Option<&Path>,
+) -> PyResult<Vec<String>> {
     let Some(overrides) = overrides else {
         return Ok(Vec::new());
     };
@@ -30,7 +34,7 @@ pub fn override_list(overrides: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Strin
     let (mut removed, mut set) = (Vec::new(), Vec::new());
     for item in mapping.items()?.iter() {
         let (key, given): (String, Bound<'_, PyAny>) = item.extract()?;
-        match value(&key, &given, None)? {
+        match value(&key, &given, store)? {
             Some(value) => set.push(format!("{key}={value}")),
             None => removed.push(format!("-{key}")),
         }
@@ -124,8 +128,12 @@ fn stored(path: &str, grain: &Bound<'_, PyGrain>, store: Option<&Path>) -> PyRes
     let Some(store) = store else {
         return Err(input(format!("{path}: a Grain cannot override; save it and give its file")));
     };
-    if !path.ends_with(".file") {
-        return Err(input(format!("{path}: a Grain stands for the key `file`")));
+    let mut keys = path.rsplit('.');
+    let is_file = keys.next() == Some("file") || keys.next() == Some("files");
+    if !is_file {
+        return Err(input(format!(
+            "{path}: a Grain stands for the key `file`, or in the list `files`"
+        )));
     }
     let shape = &grain.get().shape;
     let name = shape.digest().chars().take(12).collect::<String>();

@@ -12,8 +12,8 @@ use grainwake_study::StudyError;
 use grainwake_validation::SuiteError;
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use pyo3::exceptions::{
-    PyFileExistsError, PyFileNotFoundError, PyIsADirectoryError, PyNotADirectoryError, PyOSError,
-    PyPermissionError,
+    PyFileExistsError, PyFileNotFoundError, PyIsADirectoryError, PyKeyboardInterrupt,
+    PyNotADirectoryError, PyOSError, PyPermissionError,
 };
 use pyo3::prelude::*;
 
@@ -128,6 +128,7 @@ impl IntoException for WrongCase {
         match &self {
             WrongCase::Unreadable { source, .. } => system(source.kind(), self.to_string()),
             WrongCase::Invalid(problems) => refused(problems),
+            WrongCase::Interrupted => PyKeyboardInterrupt::new_err(self.to_string()),
         }
     }
 }
@@ -148,6 +149,7 @@ impl IntoException for ShapeError {
     fn into_exception(self) -> PyErr {
         match &self {
             ShapeError::Io { source, .. } => system(source.kind(), self.to_string()),
+            ShapeError::Interrupted => PyKeyboardInterrupt::new_err(self.to_string()),
             _ => match advice(&self) {
                 Some(advice) => refused(&[Problem::new(self.to_string()).help(advice)]),
                 None => input(self.to_string()),

@@ -8,6 +8,8 @@ mod arguments;
 mod arrays;
 mod case;
 mod case_dict;
+mod case_new;
+mod case_variant;
 mod error;
 mod grain;
 mod results;

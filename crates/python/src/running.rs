@@ -72,6 +72,18 @@ pub fn attended<T: Send>(
     })
 }
 
+/// Runs `work` on another thread, and sets its flag if a signal handler raises an exception.
+pub fn interruptible<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    match attended(py, &stop, || work(&stop), |_| Ok(()))? {
+        (result, None) => Ok(result),
+        (_, Some(error)) => Err(error),
+    }
+}
+
 /// State of a run that its thread shares with that of Python.
 #[derive(Default)]
 struct Shared {

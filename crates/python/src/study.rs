@@ -88,7 +88,7 @@ impl PyStudy {
         path: PathBuf,
         overrides: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyStudy> {
-        let set = override_list(overrides)?;
+        let set = override_list(overrides, None)?;
         let plan = py.detach(|| Plan::resolve(&Study::read(&path)?, &set)).raise()?;
         Ok(PyStudy { plan })
     }

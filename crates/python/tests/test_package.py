@@ -74,6 +74,41 @@ case.rum("out")
     assert "Found 2 errors" in done.stdout, done.stdout
 
 
+def test_types_admit_what_a_script_may_pass(tmp_path):
+    pytest.importorskip("mypy")
+    script = tmp_path / "script.py"
+    script.write_text("""
+import numpy as np
+import grainwake as gw
+
+size = np.float32(2e-3)
+grains = [gw.Grain.sphere(size), gw.Grain.family(np.float32(0.7), np.float32(0.5), size)]
+case = gw.Case.new(
+    size=(8e-3, np.float32(8e-3), "8 mm"),
+    end=np.int64(1),
+    boundaries="periodic",
+    grains=(
+        grain.at(np.array([x, 4e-3, 4e-3], dtype=np.float32), density=np.float32(2500))
+        for x, grain in zip([2e-3, 6e-3], grains)
+    ),
+)
+gw.Case.new(size=["8 mm"] * 3, end="1 s", cells=[16, 16, np.int64(16)])
+gw.Case.new(size=["8 mm"] * 3, end="1 s", cells=np.array([16, 16, 16]), boundaries={"x": "slip"})
+case = case.with_overrides({"grain.0.file": grains[1], "time.end": np.float32(2)})
+sim = gw.Simulation(case)
+sim.set_load(0, force=np.array([0, 0, 1]))
+sim.step(np.float32(1e-6))
+gw.Grain.superquadric(size, size, size, exponents=np.array([1, 1]))
+gw.scan(np.zeros((9, 9, 9)), voxel=size, threshold=np.float32(3), separate=np.float32(0.9))
+gw.open_run("out").slice(np.float32(1e-3))
+""")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", str(script)],
+        capture_output=True, text=True, cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stdout
+
+
 def test_the_first_example_of_the_manual_has_no_warning(root, capsys):
     page = (root / "docs" / "python.md").read_text()
     example = re.search(r"```python\n(.*?)```", page, re.DOTALL).group(1)

@@ -122,6 +122,9 @@ pub enum ShapeError {
         /// Number of cells across the longest extent that passes, if it was searched and found.
         cells: Option<usize>,
     },
+    /// The callback of the progress ended the work.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl ShapeError {

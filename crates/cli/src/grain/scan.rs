@@ -1,5 +1,7 @@
 //! `grain from-scan`.
 
+use std::ops::ControlFlow;
+
 use grainwake_shape::ReadLimits;
 use grainwake_shape::scan::{
     ScanOptions, ScannedGrain, Threshold, grey_notes, read_volume_and_voxel, scan_volume,
@@ -56,6 +58,7 @@ pub fn from_scan(args: &FromScanArgs) -> Result<(), Exit> {
         bar.set_message(what.to_owned());
         bar.set_length(total);
         bar.set_position(done);
+        ControlFlow::Continue(())
     });
     bar.finish_and_clear();
     let scan = scan?;

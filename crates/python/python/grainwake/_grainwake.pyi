@@ -5,6 +5,7 @@ import pathlib
 from typing import (
     Any,
     Callable,
+    Iterable,
     Iterator,
     Literal,
     Mapping,
@@ -26,12 +27,13 @@ from ._simulation import State
 from ._studies import StudyFolder
 
 _Path = str | os.PathLike[str]
-_Quantity = float | str
-_Vector = Sequence[float | str] | npt.NDArray[np.float64]
+_Number = float | np.floating[Any] | np.integer[Any]
+_Quantity = _Number | str
+_Vector = Sequence[_Quantity] | npt.NDArray[np.floating[Any] | np.integer[Any]]
 _Overrides = Mapping[str, Any] | Sequence[str] | None
 _Progress = bool | Callable[[dict[str, Any]], object] | None
 _Mesh = _Path | tuple[npt.ArrayLike, npt.ArrayLike] | pyvista.PolyData | trimesh.Trimesh
-_Threshold = float | Literal["otsu", "otsu3"] | None
+_Threshold = _Number | Literal["otsu", "otsu3"] | None
 _Floats = npt.NDArray[np.float64]
 _Integers = npt.NDArray[np.int64]
 _Field = npt.NDArray[np.float64] | npt.NDArray[np.float32]
@@ -85,7 +87,7 @@ class Grain:
         b: _Quantity,
         c: _Quantity,
         *,
-        exponents: Sequence[float] | npt.NDArray[np.float64],
+        exponents: Sequence[_Number] | npt.NDArray[np.floating[Any] | np.integer[Any]],
         cells: SupportsIndex | None = None,
         nodes: SupportsIndex | None = None,
     ) -> Grain: ...
@@ -108,11 +110,11 @@ class Grain:
         threshold: _Threshold = None,
         median: bool = False,
         split: bool = False,
-        separate: float | None = None,
+        separate: _Number | None = None,
         from_mask: bool = False,
         pad: bool = False,
         largest_piece: bool = False,
-        smoothing: float | None = None,
+        smoothing: _Number | None = None,
         rescue: bool = False,
         labels: bool = False,
         roundness: bool = True,
@@ -122,11 +124,11 @@ class Grain:
     ) -> Grain: ...
     @staticmethod
     def family(
-        sphericity: float,
-        roundness: float,
+        sphericity: _Number,
+        roundness: _Number,
         equivalent_diameter: _Quantity | None = None,
         *,
-        flatness: float | None = None,
+        flatness: _Number | None = None,
         seed: SupportsIndex = 1,
         cells: SupportsIndex | None = None,
         nodes: SupportsIndex | None = None,
@@ -215,11 +217,11 @@ def scan(
     threshold: _Threshold = None,
     median: bool = False,
     split: bool = False,
-    separate: float | None = None,
+    separate: _Number | None = None,
     from_mask: bool = False,
     pad: bool = False,
     largest_piece: bool = False,
-    smoothing: float | None = None,
+    smoothing: _Number | None = None,
     rescue: bool = False,
     labels: bool = False,
     roundness: bool = True,
@@ -244,20 +246,22 @@ class Case:
     def new(
         *,
         size: _Vector,
-        cell_size: _Quantity | _Vector,
         end: _Quantity,
+        cell_size: _Quantity | _Vector | None = None,
+        cells: Sequence[SupportsIndex] | npt.NDArray[np.integer[Any]] | None = None,
         refinement: SupportsIndex | None = None,
         refinement_margin: _Quantity | _Vector | None = None,
-        grains: Sequence[Mapping[str, Any]] | None = None,
+        grains: Iterable[Mapping[str, Any]] | None = None,
         fluid: Mapping[str, Any] | None = None,
         gravity: _Vector | None = None,
-        boundaries: Mapping[str, Any] | None = None,
+        boundaries: str | Mapping[str, Any] | None = None,
         title: str | None = None,
         folder: _Path = ...,
         **tables: Any,
     ) -> Case: ...
     @staticmethod
-    def _from_parts(resolved: str, grains: Sequence[tuple[str, bytes]]) -> Case: ...
+    def _from_parts(resolved: str, grains: Sequence[tuple[str, bytes]], origin: str) -> Case: ...
+    def with_overrides(self, overrides: Mapping[str, Any] | Sequence[str]) -> Case: ...
     @staticmethod
     def schema() -> dict[str, Any]: ...
     def run(
@@ -398,6 +402,7 @@ class Study:
         retry: bool = False,
         keep_checkpoints: bool = False,
         accept: list[str] | None = None,
+        force: bool = False,
         progress: _Progress = None,
     ) -> StudyFolder: ...
     @staticmethod

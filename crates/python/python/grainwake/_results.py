@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
 Path = Union[str, "os.PathLike[str]"]
-Time = Union[float, str]
+Time = Union[float, np.floating[Any], np.integer[Any], str]
 
 _UNITS = {"velocity": "m/s", "vorticity": "1/s", "pressure": "Pa", "solid_fraction": "1"}
 

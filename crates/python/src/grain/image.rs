@@ -1,23 +1,18 @@
 //! Grains of a 3-D image.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
-use grainwake_run::case::quantity::Length;
-use grainwake_shape::ReadLimits;
-use grainwake_shape::scan::{
-    Scan, ScanOptions, Threshold, Voxels, grey_notes, read_volume_and_voxel, scan_volume,
-};
+use grainwake_shape::scan::{Scan, Voxels};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyIterator, PyString};
+use pyo3::types::{PyDict, PyIterator};
 
 use super::PyGrain;
-use super::build::{check_unit, options, plausible, sized};
-use super::volume;
-use crate::arguments::{Whole, quantity, whole};
-use crate::error::{Raise, input, warn};
+use super::build::{check_unit, plausible, sized};
+use super::read::{Given, read};
+use crate::arguments::Whole;
+use crate::error::{Raise, input};
 
 /// Grains of a 3-D image, by label.
 #[pyclass(module = "grainwake", name = "Scan", frozen)]
@@ -78,45 +73,6 @@ impl PyScan {
     }
     fn __repr__(&self) -> String {
         format!("Scan({} grains, {} labels rejected)", self.grains.len(), self.rejected.len())
-    }
-}
-
-/// Options of a scan as Python gives them.
-struct Given {
-    label: Option<Whole>,
-    median: bool,
-    split: bool,
-    separate: Option<f64>,
-    from_mask: bool,
-    pad: bool,
-    largest_piece: bool,
-    smoothing: Option<f64>,
-    rescue: bool,
-    labels: bool,
-    roundness: bool,
-    cells: Option<Whole>,
-    nodes: Option<Whole>,
-}
-
-impl Given {
-    /// Returns the checked options.
-    fn options(self, voxel: f64, threshold: Option<Threshold>) -> PyResult<ScanOptions> {
-        let mut how = ScanOptions::new(voxel);
-        how.label = whole("label", self.label.as_ref(), 0)?;
-        how.threshold = threshold;
-        how.median = self.median;
-        how.split = self.split;
-        how.separate = self.separate;
-        how.sub_voxel = !self.from_mask;
-        how.pad = self.pad;
-        how.largest_piece = self.largest_piece;
-        how.smoothing = self.smoothing;
-        how.rescue = self.rescue;
-        how.labels = self.labels;
-        how.shape = options(self.cells.as_ref(), self.nodes.as_ref())?;
-        how.shape.roundness = self.roundness;
-        how.check().raise()?;
-        Ok(how)
     }
 }
 
@@ -344,58 +300,4 @@ pub fn scan(
         .into_pyarray(py)
         .unbind();
     Ok(PyScan { grains: accepted, rejected, voxels, labels, threshold })
-}
-
-fn read(
-    py: Python<'_>,
-    image: &Bound<'_, PyAny>,
-    voxel: &Bound<'_, PyAny>,
-    threshold: Option<&Bound<'_, PyAny>>,
-    given: Given,
-) -> PyResult<Scan> {
-    let voxel = quantity::<Length>("voxel", voxel)?;
-    let how = given.options(voxel, threshold.map(segmentation).transpose()?)?;
-    let quiet = |_: &str, _: u64, _: u64| {};
-    let scanned = if let Ok(path) = image.extract::<PathBuf>() {
-        let (volume, source, stated) = py
-            .detach(|| {
-                let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
-                read_volume_and_voxel(&path, &limits)
-            })
-            .raise()?;
-        let other = stated.filter(|stated| stated.contradicts(voxel)).map(|stated| {
-            let file = path.display();
-            format!(
-                "{file} states voxels of {stated}, unlike voxel = {voxel:e} m; the grains have the \
-                 size of voxel"
-            )
-        });
-        warn(py, other)?;
-        py.detach(|| scan_volume(&volume, &source, &how, &quiet))
-    } else {
-        let volume = volume::volume(image)?;
-        py.detach(|| {
-            let source = volume::source(&volume);
-            scan_volume(&volume, &source, &how, &quiet)
-        })
-    };
-    let scan = scanned.raise()?;
-    warn(py, grey_notes(&scan.grains))?;
-    Ok(scan)
-}
-
-fn segmentation(value: &Bound<'_, PyAny>) -> PyResult<Threshold> {
-    if let Ok(word) = value.cast::<PyString>() {
-        return match &*word.to_cow()? {
-            "otsu" => Ok(Threshold::Otsu),
-            "otsu3" => Ok(Threshold::Otsu3),
-            other => Err(input(format!(
-                "threshold: found \"{other}\"; expected a grey value, \"otsu\" or \"otsu3\""
-            ))),
-        };
-    }
-    value
-        .extract()
-        .map(Threshold::Value)
-        .map_err(|_| input("threshold: expected a grey value, \"otsu\" or \"otsu3\""))
 }

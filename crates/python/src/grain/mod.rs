@@ -2,6 +2,7 @@
 
 mod build;
 pub mod image;
+mod read;
 mod volume;
 
 use std::path::PathBuf;

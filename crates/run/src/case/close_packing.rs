@@ -35,7 +35,7 @@ const RELAXATION: f64 = 0.9;
 
 /// Returns random centres [m] at which the surfaces of the grains keep the clearance from each
 /// other, from the grains that are placed already and from the faces of the region; none if they do
-/// not fit. The orientations stay.
+/// not fit or the search was ended. The orientations stay.
 pub(super) fn close_places(
     region: &Region,
     grains: &[Grain],
@@ -56,6 +56,7 @@ fn shrink(region: &Region, grains: &[Grain], random: &mut Random) -> Option<Vec<
     let starts = loop {
         match enlarged(region, scale).random(&radii, random) {
             Some(centres) => break centres,
+            None if region.stopped() => return None,
             None => scale *= GROWTH,
         }
     };
@@ -83,7 +84,7 @@ fn fraction(region: &Region, grains: &[Grain], diameter: fn(&Grain) -> f64) -> f
 }
 
 /// Returns the region with all lengths multiplied by `scale`, but the grains and the clearance.
-fn enlarged(region: &Region, scale: f64) -> Region {
+fn enlarged<'a>(region: &Region<'a>, scale: f64) -> Region<'a> {
     let Enclosure { lower, upper, .. } = region.enclosure;
     let mut placed = region.placed.clone();
     placed.iter_mut().for_each(|grain| grain.pose.position *= scale);
@@ -97,7 +98,7 @@ fn enlarged(region: &Region, scale: f64) -> Region {
 }
 
 /// Moves grains into the region and apart until they keep the clearance; returns whether they do.
-/// It gives up after `rounds`, or when they hardly come apart any more.
+/// It gives up after `rounds`, when they hardly come apart any more, or if the search was ended.
 fn move_apart(region: &Region, grains: &mut [Grain], rounds: usize) -> bool {
     let ranges: Vec<[DVec3; 2]> = grains.iter().map(|grain| centre_range(region, grain)).collect();
     let diameters = grains.iter().map(|grain| grain.shape.equivalent_diameter());
@@ -105,6 +106,9 @@ fn move_apart(region: &Region, grains: &mut [Grain], rounds: usize) -> bool {
     let count = grains.len();
     let mut to_beat = f64::INFINITY;
     for round in 0..rounds {
+        if region.stopped() {
+            return false;
+        }
         for (grain, [low, high]) in grains.iter_mut().zip(&ranges) {
             let inside = grain.pose.position.clamp(*low, *high);
             for axis in (0..3).filter(|axis| !region.spans_period(*axis)) {
@@ -160,8 +164,10 @@ fn centre_range(region: &Region, grain: &Grain) -> [DVec3; 2] {
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
 
     use super::*;
+    use crate::case::NEVER;
     use grainwake_shape::{Shape, ShapeOptions, analytic};
     use grainwake_solver::dem::{Side, outside};
     use rand::SeedableRng;
@@ -190,11 +196,11 @@ mod tests {
     }
 
     /// Box of 5 x 5 x 8 away from the origin, filled as a whole.
-    fn whole_box(periodic: bool, clearance: f64) -> Region {
+    fn whole_box(periodic: bool, clearance: f64) -> Region<'static> {
         let (lower, upper) = (DVec3::new(-3.0, 2.0, 0.0), DVec3::new(2.0, 7.0, 8.0));
         let sides = [[Side::WALL; 2]; 3];
         let enclosure = Enclosure { lower, upper, periodic: [periodic, periodic, false], sides };
-        Region { lower, upper, clearance, enclosure, placed: Vec::new() }
+        Region { lower, upper, clearance, enclosure, placed: Vec::new(), stop: &NEVER }
     }
 
     /// Places the grains and checks that they keep the clearance from each other, from the placed
@@ -268,6 +274,16 @@ mod tests {
         grains.extend((0..30).map(|_| ball(0.5, DVec3::ZERO)));
         grains.extend((0..3).map(|_| ball(1.6, DVec3::ZERO)));
         assert!(checked(&whole_box(true, 0.0), &grains, 1).is_some());
+    }
+
+    #[test]
+    fn a_search_that_was_ended_finds_no_places() {
+        let grains = turned(&ellipsoid([2.0, 1.2, 1.0]), 20);
+        let mut region = whole_box(true, 0.0);
+        assert!(close_places(&region, &grains, &mut Random::seed_from_u64(1)).is_some());
+        let stop = AtomicBool::new(true);
+        region.stop = &stop;
+        assert!(close_places(&region, &grains, &mut Random::seed_from_u64(1)).is_none());
     }
 
     #[test]

@@ -121,13 +121,16 @@ pub enum CaseError {
     /// The contents are wrong.
     #[error("{}", Problem::list(.0))]
     Invalid(Vec<Problem>),
+    /// The flag of the caller ended the work.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl CaseError {
     /// Returns the problems of an invalid case.
     pub fn problems(&self) -> &[Problem] {
         match self {
-            CaseError::Unreadable { .. } => &[],
+            CaseError::Unreadable { .. } | CaseError::Interrupted => &[],
             CaseError::Invalid(problems) => problems,
         }
     }

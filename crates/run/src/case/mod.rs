@@ -8,7 +8,7 @@
 //!
 //! A problem is reported with file, line, key and remedy; then nothing is written.
 //!
-//! Layers, downwards: `branch`, `continuation`, `validate` -> `warnings` -> `estimate`,
+//! Layers, downwards: `variant`, `branch`, `continuation`, `validate` -> `warnings` -> `estimate`,
 //! `close_packing` -> `packing`, `placement`, `shapes` -> `settling`, `expect` -> `blockage` ->
 //! `raw` -> `source` -> `quantity` -> `notation`, `units`, `located`, `error`, `suggest`.
 
@@ -37,9 +37,11 @@ mod time_scale;
 mod toml_messages;
 mod units;
 mod validate;
+mod variant;
 mod warnings;
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -58,10 +60,14 @@ pub use schema::schema;
 pub use shapes::{ClosedForms, ShapeFile};
 pub use source::Source;
 pub use suggest::{did_you_mean, nearest};
+pub use variant::Origin;
 
 use raw::{RawCase, RawExpect, RawRun};
 use shapes::Library;
 use validate::Validated;
+
+/// Flag of a case that is read to the end.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// A case that can be run.
 #[derive(Debug)]
@@ -83,6 +89,7 @@ pub struct Case {
     /// Hash of everything that decides the results up to a given time: threads, `[expect]`, the
     /// title, the end, `contact.overlap_limit` and the checkpoint intervals do not.
     pub digest: String,
+    origin: Origin,
     /// Text of the case, for the positions of later problems.
     source: Source,
     /// Resolved case.
@@ -99,6 +106,18 @@ impl Case {
         Case::load_sharing(path, overrides, &ClosedForms::default())
     }
 
+    /// Reads a case file as [`Case::load`], until another thread sets `stop`.
+    ///
+    /// # Errors
+    /// As [`Case::load`], and [`CaseError::Interrupted`].
+    pub fn load_until(
+        path: &Path,
+        overrides: &[String],
+        stop: &AtomicBool,
+    ) -> Result<Case, CaseError> {
+        Case::read(path, overrides, &ClosedForms::default(), stop)
+    }
+
     /// Reads a case file as [`Case::load`], and takes its closed forms from `shapes`.
     ///
     /// # Errors
@@ -108,10 +127,21 @@ impl Case {
         overrides: &[String],
         shapes: &ClosedForms,
     ) -> Result<Case, CaseError> {
+        Case::read(path, overrides, shapes, &NEVER)
+    }
+
+    fn read(
+        path: &Path,
+        overrides: &[String],
+        shapes: &ClosedForms,
+        stop: &AtomicBool,
+    ) -> Result<Case, CaseError> {
         let text = read_text(path, SETTINGS)
             .map_err(|source| CaseError::Unreadable { path: path.into(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        Case::parse_sharing(&text, &path.display().to_string(), folder, overrides, shapes)
+        let origin = Origin::new(&path.display().to_string(), &text, folder, overrides);
+        let library = origin.library(shapes);
+        Case::build(origin, library, stop)
     }
 
     /// Reads a case from text. Messages contain `name`; grain files are relative to `folder`.
@@ -124,19 +154,32 @@ impl Case {
         folder: &Path,
         overrides: &[String],
     ) -> Result<Case, CaseError> {
-        Case::parse_sharing(text, name, folder, overrides, &ClosedForms::default())
+        Case::parse_until(text, name, folder, overrides, &NEVER)
     }
 
-    fn parse_sharing(
+    /// Reads a case from text as [`Case::parse`], until another thread sets `stop`.
+    ///
+    /// # Errors
+    /// As [`Case::parse`], and [`CaseError::Interrupted`].
+    pub fn parse_until(
         text: &str,
         name: &str,
         folder: &Path,
         overrides: &[String],
-        shapes: &ClosedForms,
+        stop: &AtomicBool,
     ) -> Result<Case, CaseError> {
-        let (source, raw) = source::Source::parse(name, text, overrides)?;
-        let validated = validate::validate(&source, raw, Library::new(folder, shapes))?;
-        Case::of(source, validated)
+        let shapes = ClosedForms::default();
+        let origin = Origin::new(name, text, folder, overrides);
+        let library = origin.library(&shapes);
+        Case::build(origin, library, stop)
+    }
+
+    /// Reads the case of an origin.
+    fn build(origin: Origin, library: Library, stop: &AtomicBool) -> Result<Case, CaseError> {
+        let Origin { name, text, overrides, .. } = &origin;
+        let (source, raw) = source::Source::parse_in_turn(name, text, overrides)?;
+        let validated = validate::validate(&source, raw, library, stop)?;
+        Case::of(origin, source, validated)
     }
 
     /// Builds a case from `resolved` and `shapes` of another one, which it equals.
@@ -148,15 +191,18 @@ impl Case {
         let closed_forms = ClosedForms::default();
         let library = Library::of_files(&shapes, &closed_forms)
             .map_err(|(message, help)| CaseError::from(Problem::new(message).help(help)))?;
-        let mut validated = validate::validate(&source, raw, library)?;
+        let mut validated = validate::validate(&source, raw, library, &NEVER)?;
         // The digest depends on their order.
         validated.shapes = shapes;
-        Case::of(source, validated)
+        validated.paths = validated.shapes.iter().map(|(name, _)| name.into()).collect();
+        Case::of(Origin::new(RESOLVED, resolved, Path::new(""), &[]), source, validated)
     }
 
-    fn of(source: Source, validated: Validated) -> Result<Case, CaseError> {
+    fn of(mut origin: Origin, source: Source, validated: Validated) -> Result<Case, CaseError> {
         let resolved = write(&validated.resolved)?;
         let digest = digest(&validated.resolved, &validated.shapes)?;
+        let names = validated.shapes.iter().map(|(name, _)| name.clone());
+        origin.files = validated.paths.into_iter().zip(names).collect();
         Ok(Case {
             title: validated.resolved.title.clone(),
             setup: validated.setup,
@@ -166,6 +212,7 @@ impl Case {
             resolved,
             shapes: validated.shapes,
             digest,
+            origin,
             source,
             raw: validated.resolved,
         })
@@ -279,6 +326,18 @@ mod tests {
         assert_eq!((&again.resolved, &again.digest), (&case.resolved, &case.digest));
         assert_eq!((again.plan.end, again.setup.grains.len()), (2.0, 2));
         assert!(Case::from_resolved(&case.resolved, Vec::new()).is_err());
+    }
+
+    #[test]
+    fn another_thread_ends_the_reading_of_a_case() {
+        let text = "[domain]\nsize = [1, 1, 1]\n[time]\nend = 1\n[[grain]]\n\
+                    shape = { kind = \"sphere\", diameter = 0.1 }\ndensity = 2500\n\
+                    position = [0.5, 0.5, 0.5]\n";
+        let read = |stop: bool| {
+            Case::parse_until(text, "case", Path::new(""), &[], &AtomicBool::new(stop))
+        };
+        assert!(read(false).is_ok());
+        assert!(matches!(read(true), Err(CaseError::Interrupted)));
     }
 
     #[test]

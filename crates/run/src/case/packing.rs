@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 use rand::RngExt;
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::sphere_cells::{Sphere, SphereCells};
 use grainwake_solver::dem::{Enclosure, Grain};
@@ -25,7 +26,7 @@ fn point(random: &mut Random) -> DVec3 {
 }
 
 /// Part of the box to fill, and the grains in it.
-pub(super) struct Region {
+pub(super) struct Region<'a> {
     /// Lower corner [m].
     pub lower: DVec3,
     /// Upper corner [m].
@@ -36,9 +37,16 @@ pub(super) struct Region {
     pub enclosure: Enclosure,
     /// Grains that are placed already.
     pub placed: Vec<Grain>,
+    /// Flag that ends the search for places.
+    pub stop: &'a AtomicBool,
 }
 
-impl Region {
+impl Region<'_> {
+    /// Returns whether the search was ended.
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
     /// Returns the volume of the region [m^3].
     pub fn volume(&self) -> f64 {
         (self.upper - self.lower).element_product()
@@ -66,14 +74,15 @@ impl Region {
             && (self.upper - self.lower)[axis] >= self.enclosure.size()[axis] * (1.0 - 1e-9)
     }
 
-    /// Returns random centres without overlap of the spheres [m]; none if a sphere finds no place.
+    /// Returns random centres without overlap of the spheres [m]; none if a sphere finds no place,
+    /// or the search was ended.
     pub fn random(&self, radii: &[f64], random: &mut Random) -> Option<Vec<DVec3>> {
         let mut cells = self.cells(radii.iter().copied());
         let mut centres = Vec::with_capacity(radii.len());
         for &radius in radii {
             let margin = self.margin(radius);
             let room = self.upper - self.lower - 2.0 * margin;
-            if room.min_element() < 0.0 {
+            if room.min_element() < 0.0 || self.stopped() {
                 return None;
             }
             let found = (0..20_000).find_map(|_| {
@@ -168,13 +177,14 @@ mod tests {
     use grainwake_solver::dem::Side;
     use rand::SeedableRng;
 
-    fn space(enclosure: Enclosure, placed: Vec<Grain>) -> Region {
+    fn space(enclosure: Enclosure, placed: Vec<Grain>) -> Region<'static> {
         Region {
             lower: DVec3::ZERO,
             upper: DVec3::new(1.0, 1.0, 3.0),
             clearance: 0.01,
             enclosure,
             placed,
+            stop: &crate::case::NEVER,
         }
     }
 

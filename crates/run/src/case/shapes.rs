@@ -62,7 +62,9 @@ impl ClosedForms {
 
 /// Cache of the shapes of a case.
 pub(super) struct Library<'a> {
-    folder: &'a Path,
+    folder: PathBuf,
+    /// Contents of files that need not be read, by path.
+    known: BTreeMap<PathBuf, Arc<Vec<u8>>>,
     shared: &'a ClosedForms,
     files: BTreeMap<PathBuf, (ShapeFile, Arc<Shape>)>,
     built: BTreeMap<String, Arc<Shape>>,
@@ -70,8 +72,15 @@ pub(super) struct Library<'a> {
 
 impl<'a> Library<'a> {
     /// Returns an empty cache; files are relative to `folder`, closed forms are `shared`.
-    pub fn new(folder: &'a Path, shared: &'a ClosedForms) -> Library<'a> {
-        Library { folder, shared, files: BTreeMap::new(), built: BTreeMap::new() }
+    pub fn new(folder: &Path, shared: &'a ClosedForms) -> Library<'a> {
+        let (known, files, built) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        Library { folder: folder.into(), known, shared, files, built }
+    }
+
+    /// Adds the contents of files by path, which are used in place of those on the disk.
+    pub fn knowing(mut self, files: impl Iterator<Item = (PathBuf, Arc<Vec<u8>>)>) -> Library<'a> {
+        self.known.extend(files);
+        self
     }
 
     /// Returns a library of these files alone, by name.
@@ -89,9 +98,9 @@ impl<'a> Library<'a> {
         self.folder.join(name)
     }
 
-    /// Returns the files that were read, by name.
-    pub fn into_files(self) -> Vec<ShapeFile> {
-        self.files.into_values().map(|(file, _)| file).collect()
+    /// Returns the files that were read, with their paths.
+    pub fn into_files(self) -> impl Iterator<Item = (PathBuf, ShapeFile)> {
+        self.files.into_iter().map(|(path, (file, _))| (path, file))
     }
 
     /// Returns the shape in a file, and the file's name in the run folder.
@@ -101,7 +110,9 @@ impl<'a> Library<'a> {
             return Ok((shape.clone(), file.0.clone()));
         }
         let limit = ReadLimits::default().file_bytes;
-        let bytes = read_bytes(&path, limit).map_err(|error| match error.kind() {
+        let read = || read_bytes(&path, limit).map(Arc::new);
+        let known = self.known.get(&path).cloned();
+        let bytes = known.map_or_else(read, Ok).map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => (
                 format!("there is no grain file {}", path.display()),
                 "paths are relative to the case file; make a grain file with `grainwake grain from-scan`, `from-mesh` or `make`".to_string(),
@@ -118,7 +129,7 @@ impl<'a> Library<'a> {
             count += 1;
             name = format!("shapes/{stem}-{count}.grain");
         }
-        self.files.insert(path, ((name.clone(), Arc::new(bytes)), shape.clone()));
+        self.files.insert(path, ((name.clone(), bytes), shape.clone()));
         Ok((shape, name))
     }
 

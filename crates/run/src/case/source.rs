@@ -68,6 +68,16 @@ impl Source {
         text: &str,
         overrides: &[String],
     ) -> Result<(Source, T), Problem> {
+        Source::parse_in_turn(name, text, &[overrides])
+    }
+
+    /// Reads a text like [`Source::parse`] with several lists of overrides: each applies to the
+    /// result of the one before.
+    pub(super) fn parse_in_turn<T: DeserializeOwned>(
+        name: &str,
+        text: &str,
+        lists: &[impl AsRef<[String]>],
+    ) -> Result<(Source, T), Problem> {
         admit(name, text)?;
         let mut source = Source {
             name: name.into(),
@@ -76,28 +86,34 @@ impl Source {
             entries: Vec::new(),
         };
         let mut start = text.len() + 1;
-        let (removed, overrides): (Vec<&String>, Vec<&String>) =
-            overrides.iter().partition(|item| item.starts_with('-'));
-        for item in &overrides {
+        let removes = |item: &&String| item.starts_with('-');
+        let all = lists.iter().flat_map(AsRef::as_ref);
+        for item in all.filter(|item| !removes(item)) {
             let line = override_line(item)?;
             let length = line.len() + 1;
             source.overrides.push(Override { start, line });
             start += length;
         }
         let mut table = DeTable::parse(text).map_err(|e| source.located(&e))?;
-        for key in removed {
-            remove_key(table.get_mut(), &key[1..])?;
-        }
         // Each override is parsed after as many blanks as there is text before it, which makes its
         // spans count from the start of the file.
         let padded: Vec<String> =
             source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
-        for (item, line) in padded.iter().zip(&overrides) {
-            let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-            let key = line.split_once('=').map_or(line.as_str(), |(key, _)| key).trim();
-            let parts = key.split('.').count();
-            override_table(table.get_mut(), extra.into_inner(), parts)
-                .map_err(|m| Problem::new(m).key(key).at("--set", line, 0..key.len(), "here"))?;
+        let mut padded = padded.iter();
+        for list in lists {
+            let (removed, set): (Vec<&String>, Vec<&String>) =
+                list.as_ref().iter().partition(removes);
+            for key in removed {
+                remove_key(table.get_mut(), &key[1..])?;
+            }
+            for (line, item) in set.into_iter().zip(&mut padded) {
+                let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
+                let key = line.split_once('=').map_or(line.as_str(), |(key, _)| key).trim();
+                let parts = key.split('.').count();
+                override_table(table.get_mut(), extra.into_inner(), parts).map_err(|m| {
+                    Problem::new(m).key(key).at("--set", line, 0..key.len(), "here")
+                })?;
+            }
         }
         collect_keys(table.get_ref(), "", text, &mut source.entries);
         let value = T::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;

@@ -6,11 +6,12 @@ use super::refusals::{Refusal, Refused, refusals};
 use super::regions::{Region, regions, shared_surfaces};
 use super::segments::{Masked, segment};
 use super::volume::{Volume, Voxels};
-use super::{Progress, ScanOptions};
+use super::{Progress, ScanOptions, report};
 use crate::error::{Result, ShapeError, first_few, within};
 use crate::limits::SourceFile;
 use crate::{Shape, specks};
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Result for one label.
@@ -76,13 +77,14 @@ pub fn shapes_from_volume(
     source: &SourceFile,
     options: &ScanOptions,
 ) -> Result<Vec<ScannedGrain>> {
-    scan_volume(volume, source, options, &|_, _, _| {}).map(|scan| scan.grains)
+    scan_volume(volume, source, options, &|_, _, _| ControlFlow::Continue(()))
+        .map(|scan| scan.grains)
 }
 
 /// Builds the shapes of the grains and the label image, and reports progress.
 ///
 /// # Errors
-/// As [`shapes_from_volume`].
+/// As [`shapes_from_volume`], and [`ShapeError::Interrupted`] if `progress` ends the work.
 pub fn scan_volume(
     volume: &Volume,
     source: &SourceFile,
@@ -120,21 +122,23 @@ pub fn scan_volume(
     let shared = shared_surfaces(dims, labels);
     let done = AtomicU64::new(0);
     let total = selected.len() as u64;
-    progress("shapes", 0, total);
+    let go_on = || report(progress, "shapes", done.load(Ordering::Relaxed), total);
+    go_on()?;
     let grains: Vec<ScannedGrain> = selected
         .par_iter()
         .map(|(label, region)| {
-            let (shape, rescued) = attempt(&context, **label, region);
-            progress("shapes", done.fetch_add(1, Ordering::Relaxed) + 1, total);
-            ScannedGrain {
+            let (shape, rescued) = attempt(&context, **label, region, &go_on)?;
+            done.fetch_add(1, Ordering::Relaxed);
+            go_on()?;
+            Ok(ScannedGrain {
                 label: **label,
                 voxels: region.voxels,
                 shared_surface: shared.get(label).copied().unwrap_or(0.0),
                 shape,
                 rescued,
-            }
+            })
         })
-        .collect();
+        .collect::<Result<_>>()?;
     let refused: Vec<Refused> = grains
         .iter()
         .filter_map(|grain| {
@@ -142,7 +146,7 @@ pub fn scan_volume(
             Some(Refused { label: grain.label, voxels: grain.voxels, why })
         })
         .collect();
-    let refusals = refusals(&context, &regions, &refused, progress);
+    let refusals = refusals(&context, &regions, &refused, progress)?;
     Ok(Scan {
         grains,
         labels: Volume { dims, voxels: Voxels::Labels(segments.labels) },
@@ -154,16 +158,23 @@ pub fn scan_volume(
 
 /// Builds the shape of a label. If it is refused and labels are to be rescued, tries the cures, the
 /// gentlest first. Which of several pieces is the grain remains a question for the user.
-fn attempt(context: &Context, label: u32, region: &Region) -> (Result<Shape>, Option<Cure>) {
+/// The outer error is that of `go_on`.
+fn attempt(
+    context: &Context,
+    label: u32,
+    region: &Region,
+    go_on: &dyn Fn() -> Result<()>,
+) -> Result<(Result<Shape>, Option<Cure>)> {
     let shape = grain::shape(context, label, region, Cure::default());
     let Some(why) = shape.as_ref().err().filter(|_| context.options.rescue) else {
-        return (shape, None);
+        return Ok((shape, None));
     };
     let cures = cures(why, context.options, context.smoothing());
     for cure in cures.into_iter().filter(|cure| !cure.largest_piece) {
+        go_on()?;
         if let Ok(rescued) = grain::shape(context, label, region, cure) {
-            return (Ok(rescued), Some(cure));
+            return Ok((Ok(rescued), Some(cure)));
         }
     }
-    (shape, None)
+    Ok((shape, None))
 }

@@ -45,6 +45,10 @@ mod transform;
 mod volume;
 mod watershed;
 
+use std::ops::ControlFlow;
+
+use crate::error::{Result, ShapeError};
+
 pub use assumed::Assumed;
 pub use build::{Scan, ScannedGrain, scan_volume, shapes_from_volume};
 pub use cure::Cure;
@@ -57,8 +61,17 @@ pub use segments::Masked;
 pub use threshold::Threshold;
 pub use volume::{Volume, Voxels};
 
-/// Callback for progress: stage, completed steps, total steps.
-pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) + Sync);
+/// Callback for progress: stage, completed steps, total steps. `Break` ends the work with
+/// [`ShapeError::Interrupted`] before the next grain.
+pub type Progress<'a> = &'a (dyn Fn(&str, u64, u64) -> ControlFlow<()> + Sync);
+
+/// Reports progress; returns an error if the callback ends the work.
+fn report(progress: Progress, stage: &str, done: u64, total: u64) -> Result<()> {
+    match progress(stage, done, total) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(ShapeError::Interrupted),
+    }
+}
 
 /// Solid voxels of one grain in a box of background.
 pub(crate) struct Mask {

@@ -3,9 +3,9 @@
 use super::cure::{Cure, cures};
 use super::grain::{self, Context};
 use super::regions::Region;
-use super::{Progress, ScanOptions};
+use super::{Progress, ScanOptions, report};
 use crate::assemble::ShapeOptions;
-use crate::error::{Defect, ShapeError};
+use crate::error::{Defect, Result, ShapeError};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -49,7 +49,7 @@ pub(super) fn refusals(
     regions: &BTreeMap<u32, Region>,
     refused: &[Refused],
     progress: Progress,
-) -> Vec<Refusal> {
+) -> Result<Vec<Refusal>> {
     let mut groups: Vec<(String, Vec<&Refused>)> = Vec::new();
     for one in refused {
         let reason = reason(one.why);
@@ -62,16 +62,16 @@ pub(super) fn refusals(
         .into_iter()
         .map(|(reason, group)| {
             let sizes = || group.iter().map(|r| r.voxels);
-            Refusal {
+            let advice = match context.options.advise {
+                true => advice(context, regions, &group, progress)?,
+                false => None,
+            };
+            Ok(Refusal {
                 reason,
                 labels: group.iter().map(|r| r.label).collect(),
                 voxels: [sizes().min().unwrap_or(0), sizes().max().unwrap_or(0)],
-                advice: context
-                    .options
-                    .advise
-                    .then(|| advice(context, regions, &group, progress))
-                    .flatten(),
-            }
+                advice,
+            })
         })
         .collect()
 }
@@ -108,11 +108,12 @@ fn advice(
     regions: &BTreeMap<u32, Region>,
     group: &[&Refused],
     progress: Progress,
-) -> Option<Advice> {
+) -> Result<Option<Advice>> {
     let options = context.options;
-    let cures = cures(group.first()?.why, options, context.smoothing());
+    let why = group.first().map(|one| one.why);
+    let cures = why.map_or_else(Vec::new, |why| cures(why, options, context.smoothing()));
     if cures.is_empty() {
-        return None;
+        return Ok(None);
     }
     let mut order: Vec<&&Refused> = group.iter().collect();
     order.sort_by_key(|r| (std::cmp::Reverse(r.voxels), r.label));
@@ -127,7 +128,7 @@ fn advice(
     // A rescue has tried these cures already, except for several pieces.
     let known = options.rescue && cures.iter().all(|cure| !cure.largest_piece);
     for (n, cure) in cures.iter().enumerate().filter(|_| !known) {
-        progress("options", n as u64, cures.len() as u64);
+        report(progress, "options", n as u64, cures.len() as u64)?;
         let accepts =
             |label: &&u32| grain::shape(&context, **label, &regions[*label], *cure).is_ok();
         let accepted = labels.par_iter().filter(accepts).count();
@@ -138,5 +139,5 @@ fn advice(
             break;
         }
     }
-    Some(best)
+    Ok(Some(best))
 }

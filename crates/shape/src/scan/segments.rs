@@ -5,7 +5,7 @@ use super::grey::{Grey, LAYERS};
 use super::threshold::median;
 use super::volume::{LARGEST_LABEL, Volume, Voxels, is_label};
 use super::watershed::{HALO, add_halo, separate};
-use super::{Mask, Progress, ScanOptions, looks_grey, transform};
+use super::{Mask, Progress, ScanOptions, looks_grey, report, transform};
 use crate::error::{Result, ShapeError};
 use crate::grid::place;
 use crate::limits::SourceFile;
@@ -86,7 +86,7 @@ pub(super) fn segment(
         (Voxels::Labels(v), _) => v.iter().map(|v| *v as f32).collect(),
         (Voxels::Grey(v), _) => v.clone(),
     };
-    progress("threshold", 0, 1);
+    report(progress, "threshold", 0, 1)?;
     let clean = options.median.then(|| median(&values, dims));
     let filtered = clean.as_ref().unwrap_or(&values);
     let view = options.threshold.and_then(|t| FieldOfView::of(&values, dims, t));
@@ -140,7 +140,7 @@ fn divide(
         let divided = if options.split { pieces(dims, |n| labels[n]).0 } else { labels.to_vec() };
         return Ok((divided, filled));
     };
-    progress("separate", 0, 1);
+    report(progress, "separate", 0, 1)?;
     let mut mask = Mask { dims, solid: labels.iter().map(|l| *l != 0).collect() };
     if mask.solid.iter().all(|s| *s) {
         return Err(ShapeError::SolidVolume);

@@ -6,6 +6,7 @@ use grainwake_shape::family::{FamilyTarget, family_grain};
 use grainwake_shape::scan::{ScanOptions, Threshold, Volume, Voxels, scan_volume};
 use grainwake_shape::{Shape, ShapeOptions, SourceFile};
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 
 /// A grain with its place [voxels].
 struct Placed<'a> {
@@ -196,7 +197,9 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     };
     // All labels, the shape of one grain only: shapes take longest.
     let one = ScanOptions { label: Some(1), ..options.clone() };
-    let scan = scan_volume(&volume, &SourceFile::default(), &one, &|_, _, _| {}).unwrap();
+    let scan =
+        scan_volume(&volume, &SourceFile::default(), &one, &|_, _, _| ControlFlow::Continue(()))
+            .unwrap();
     let Voxels::Labels(labels) = &scan.labels.voxels else { panic!() };
     // One to one: a grain and a label share four fifths of the voxels that either has.
     let mut shared: HashMap<(usize, u32), usize> = HashMap::new();
@@ -224,7 +227,14 @@ fn separated(seed: u64, noise: f64) -> (usize, f64) {
     let Voxels::Labels(image) = &volume.voxels else { panic!() };
     let lower = image[..dims[0] * dims[1] * height].to_vec();
     let volume = Volume::from_labels([dims[0], dims[1], height], lower).unwrap();
-    let scan = scan_volume(&volume, &SourceFile::default(), &options, &|_, _, _| {}).unwrap();
+    let scan =
+        scan_volume(
+            &volume,
+            &SourceFile::default(),
+            &options,
+            &|_, _, _| ControlFlow::Continue(()),
+        )
+        .unwrap();
     let mut errors = Vec::new();
     for shape in scan.grains.iter().filter_map(|g| g.shape.as_ref().ok()) {
         let centre = shape.provenance().centroid;

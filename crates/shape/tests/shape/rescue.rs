@@ -8,6 +8,7 @@ use grainwake_shape::scan::{
 };
 use grainwake_shape::{ReadLimits, ShapeError, ShapeOptions, SourceFile};
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 fn options() -> ScanOptions {
     let shape = ShapeOptions { cells: Some(32), roundness: false, ..Default::default() };
@@ -15,7 +16,7 @@ fn options() -> ScanOptions {
 }
 
 fn scan(volume: &Volume, options: &ScanOptions) -> Result<Scan, ShapeError> {
-    scan_volume(volume, &SourceFile::default(), options, &|_, _, _| {})
+    scan_volume(volume, &SourceFile::default(), options, &|_, _, _| ControlFlow::Continue(()))
 }
 
 fn accepted(scan: &Scan) -> Vec<u32> {

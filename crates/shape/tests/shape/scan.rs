@@ -7,6 +7,7 @@ use grainwake_shape::scan::{
 };
 use grainwake_shape::{ReadLimits, Shape, ShapeError, ShapeOptions, SourceFile};
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 const VOXEL: f64 = 2e-5;
 
@@ -245,7 +246,8 @@ fn a_real_packing_is_separated_as_others_do() {
             label: Some(1),
             ..options()
         };
-        let scan = scan_volume(&volume, &source, &options, &|_, _, _| {}).unwrap();
+        let scan =
+            scan_volume(&volume, &source, &options, &|_, _, _| ControlFlow::Continue(())).unwrap();
         let Voxels::Labels(labels) = &scan.labels.voxels else { panic!() };
         let dims = volume.dims;
         let most = *labels.iter().max().unwrap() as usize;
@@ -317,4 +319,16 @@ fn images_of_two_values_are_masks() {
         assert_eq!(shape.volume(), expect, "{void} and {solid}");
         assert!(!shape.provenance().parameters.iter().any(|(name, _)| name == "surface"));
     }
+}
+
+/// A scan of many grains takes long: the callback of its progress ends it.
+#[test]
+fn the_callback_of_the_progress_ends_a_scan() {
+    let volume = voxelised(DVec3::splat(10.0), DQuat::IDENTITY, DVec3::ZERO);
+    let stop = |what: &str, done: u64, _: u64| match (what, done) {
+        ("shapes", 1) => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    };
+    let error = scan_volume(&volume, &SourceFile::default(), &options(), &stop).unwrap_err();
+    assert!(matches!(error, ShapeError::Interrupted), "{error}");
 }

@@ -1,5 +1,7 @@
 //! Collector of the problems of a case.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::DVec3;
 
 use crate::case::error::Problem;
@@ -12,13 +14,20 @@ use grainwake_solver::grid::Mesh;
 /// Collector of problems; a case without problems is valid.
 pub(super) struct Checker<'a> {
     source: &'a Source,
+    /// Flag that ends the work.
+    pub stop: &'a AtomicBool,
     pub problems: Vec<Problem>,
 }
 
 impl<'a> Checker<'a> {
-    pub fn new(source: &'a Source) -> Checker<'a> {
+    pub fn new(source: &'a Source, stop: &'a AtomicBool) -> Checker<'a> {
         let problems = Vec::new();
-        Checker { source, problems }
+        Checker { source, stop, problems }
+    }
+
+    /// Returns whether the work was ended.
+    pub fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Reports a problem of the value at `span`; its key follows from the position.

@@ -222,6 +222,10 @@ pub(super) fn shape(
     raw: &Located<RawGrain>,
     resolved: &mut RawGrain,
 ) -> Option<Arc<Shape>> {
+    // A thousand sizes of one shape take seconds.
+    if check.stopped() {
+        return None;
+    }
     let refused = |check: &mut Checker, span: &Span, (message, help): (String, String)| {
         check.fail(span, message, help);
     };

@@ -14,6 +14,9 @@ mod poses;
 mod probes;
 mod scales;
 
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
 use self::arrangement::Placement;
 use self::check::Checker;
 use self::grains::{Grains, Vertical};
@@ -35,18 +38,24 @@ pub(super) struct Validated {
     pub plan: RunPlan,
     pub expect: Vec<Expectation>,
     pub shapes: Vec<ShapeFile>,
+    /// Path of each shape file.
+    pub paths: Vec<PathBuf>,
     /// Case with all defaults written out.
     pub resolved: RawCase,
 }
 
-/// Validates a case with its library of shapes.
+/// Validates a case with its library of shapes, until `stop` is set.
 pub(super) fn validate(
     source: &Source,
     raw: RawCase,
     library: Library,
+    stop: &AtomicBool,
 ) -> Result<Validated, CaseError> {
-    let mut check = Checker::new(source);
+    let mut check = Checker::new(source, stop);
     let validated = resolve(&mut check, raw, library);
+    if check.stopped() {
+        return Err(CaseError::Interrupted);
+    }
     match validated.filter(|_| check.problems.is_empty()) {
         Some(validated) => {
             let checked = validated.setup.validate();
@@ -128,7 +137,8 @@ fn resolve(check: &mut Checker, mut raw: RawCase, library: Library) -> Option<Va
     raw.packing = Vec::new();
     raw.poses = Vec::new();
     raw.output.planes = Some(plan.planes.iter().map(|p| RawPlane::from(p).into()).collect());
-    Some(Validated { setup, plan, expect, shapes: library.into_files(), resolved: raw })
+    let (paths, shapes) = library.into_files().unzip();
+    Some(Validated { setup, plan, expect, shapes, paths, resolved: raw })
 }
 
 /// Adds the grains of tables of poses and of packings; `None` after a problem.

@@ -60,7 +60,8 @@ pub(super) fn packing(
         return check.refuse(region_span, message, format!("the box goes from {from} to {to}"));
     };
     let placed: Vec<Grain> = grains.built.iter().flatten().cloned().collect();
-    let region = Region { lower, upper, clearance, enclosure: *enclosure, placed };
+    let stop = check.stop;
+    let region = Region { lower, upper, clearance, enclosure: *enclosure, placed, stop };
     let vertical = (grains.vertical.axis, grains.vertical.sign);
     let centres = match raw.arrangement {
         Arrangement::Lattice => lattice(&region, &bodies, jitter, vertical, &mut random),
