@@ -634,3 +634,36 @@ def test_states_become_a_table(sim):
     assert isinstance(table, pandas.DataFrame)
     assert list(table["grain"]) == [0, 0, 0]
     assert table["vz"].is_monotonic_decreasing
+
+
+def test_states_are_compared_by_identity(sim):
+    first, second = sim.state(), sim.state()
+    assert first == first and first != second
+    assert {first, second, first} == {second, first} and first in [second, first]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_simulation_is_refused_in_a_process_made_by_fork(case):
+    sim = gw.Simulation(case)
+    sim.step()
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        # A step of its own would wait forever for threads that do not exist.
+        signal.alarm(20)
+        told = []
+        for call in (sim.step, sim.diagnostics, lambda: sim.advance_to(1)):
+            try:
+                call()
+            except RuntimeError as error:
+                told.append(str(error))
+        os.write(writer, repr((told, sim.positions.tolist())).encode())
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as pipe:
+        told, positions = ast.literal_eval(pipe.read())
+    assert os.waitpid(child, 0)[1] == 0
+    assert len(told) == 3 and all('start method "spawn"' in text for text in told)
+    assert positions == sim.positions.tolist()
+    sim.step()

@@ -25,9 +25,13 @@ _SAME = 1e-9
 _SHORTEST = 0.1
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
+# Arrays have no single truth value and no hash: states are compared by identity.
+@dataclasses.dataclass(frozen=True, repr=False, eq=False)
 class State:
     """Motion of the grains at one time; the arrays are read-only copies.
+
+    A state equals only itself, so that it can be a key or a member of a set; compare the arrays
+    with ``numpy.array_equal``.
 
     Attributes
     ----------
