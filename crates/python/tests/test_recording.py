@@ -1,6 +1,7 @@
 """Simulations that Python steps and that write a run folder."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -270,3 +271,38 @@ def test_a_run_ends_at_the_end_of_its_case(case, tmp_path):
     # In memory the end of the case is no bound.
     assert [state.time for state in sim.run(until="22 ms", every="2 ms", progress=False)][1:] == [
         pytest.approx(0.022)]
+
+
+def test_a_folder_that_cannot_be_written_leaves_the_state_sound(case, tmp_path):
+    sim = gw.Simulation(case, output=tmp_path / "run")
+    sim.advance_to("5 ms")
+    shutil.rmtree(tmp_path / "run")
+    with pytest.raises(OSError, match="cannot write") as first:
+        sim.advance_to("12 ms")
+    for again in (sim.step, sim.checkpoint, sim.finish, lambda: sim.set_load(0)):
+        with pytest.raises(OSError) as repeated:
+            again()
+        assert type(repeated.value) is type(first.value)
+        assert str(first.value) in str(repeated.value)
+        assert "save_checkpoint keeps the present state" in str(repeated.value)
+    assert not sim.ended and 0.005 < sim.time <= 0.012
+    # The state goes on in another place, with the bits of a run without the failure.
+    sim.save_checkpoint(tmp_path / "kept")
+    other = gw.Simulation(case)
+    other.restore_checkpoint(tmp_path / "kept")
+    assert (other.time, other.steps) == (sim.time, sim.steps)
+    whole = gw.Simulation(case, output=tmp_path / "whole")
+    whole.advance_to("5 ms")
+    whole.advance_to("12 ms")
+    other.advance_to("12 ms")
+    assert np.array_equal(other.positions, whole.positions)
+
+
+def test_a_failed_finish_is_repeated(case, tmp_path):
+    sim = gw.Simulation(case, output=tmp_path / "run")
+    sim.step()
+    shutil.rmtree(tmp_path / "run")
+    for _ in range(2):
+        with pytest.raises(OSError, match="cannot"):
+            sim.finish()
+    sim.save_checkpoint(tmp_path / "kept")

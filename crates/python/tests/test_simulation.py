@@ -1,5 +1,6 @@
 """Simulations in memory: steps, arrays, control, interruption, checkpoints."""
 
+import ast
 import gc
 import itertools
 import os

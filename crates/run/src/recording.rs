@@ -140,6 +140,7 @@ impl Opened {
             provenance: self.provenance,
             meter: Meter::start(),
             saved: Saved { at: Instant::now(), time: sim.time(), step: None },
+            broken: false,
             out,
             _lock: self.lock,
         })
@@ -211,6 +212,8 @@ pub struct Recording {
     provenance: Provenance,
     pub(crate) meter: Meter,
     saved: Saved,
+    /// Whether a step has failed.
+    broken: bool,
     _lock: Lock,
 }
 
@@ -317,6 +320,12 @@ impl Recording {
         Err(StepError { time, step, what, remedy })
     }
 
+    /// Returns whether a step has failed. After another error, such as that of a full disk, the
+    /// state of the simulation is sound.
+    pub fn step_failed(&self) -> bool {
+        self.broken
+    }
+
     /// Returns whether the end of the case is reached.
     pub fn at_end(&self, sim: &Simulation) -> bool {
         self.plan.at_end(sim.time())
@@ -334,6 +343,7 @@ impl Recording {
 
     /// Writes `failure.json`; the last valid checkpoint is kept.
     fn failed(&mut self, sim: &Simulation, source: StepError) -> RunError {
+        self.broken = true;
         let StepError { time: at, step, what, remedy } = &source;
         let terms = terms(sim);
         let (remedy, time) = (remedy.advice(&terms), self.saved.time);

@@ -16,7 +16,7 @@ use grainwake_solver::sim::{Setup, Simulation, StepRule};
 use pyo3::prelude::*;
 use sha2::{Digest, Sha256};
 
-use super::{PySimulation, changing, reading, watch};
+use super::{Ended, PySimulation, changing, computing, watch};
 use crate::error::{input, system};
 
 const SIGNATURE: &[u8; 8] = b"GWSTATE\n";
@@ -63,7 +63,7 @@ impl PySimulation {
         let events =
             serde_json::from_slice::<Option<TrackerState>>(&decoder.bytes().map_err(text)?)
                 .map_err(|error| error.to_string())?;
-        self.failed = Some("the state could not be restored".into());
+        self.failed = Some(Ended::Step("the state could not be restored".into()));
         self.pool.clone().install(|| {
             // The memory of the old simulation is free before the new one is built.
             let empty = Setup::new(Mesh::cubic([1; 3], 1.0)).with_step(StepRule::Fixed(1.0));
@@ -92,15 +92,17 @@ impl PySimulation {
     /// Raises
     /// ------
     /// SolverError
-    ///     The simulation has failed.
+    ///     The numerics have failed.
+    /// OSError
+    ///     Writing failed.
     ///
     /// Notes
     /// -----
     /// Prescribed motions and external loads are not part of the state: set them again after
     /// `restore_checkpoint`.
     fn save_checkpoint(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
-        let this = &*reading(slf)?;
-        this.has_not_failed()?;
+        let this = &*computing(slf)?;
+        this.is_sound()?;
         let written = slf.py().detach(|| {
             let bytes = this.encode()?;
             write_atomically(&path, true, |out| out.write_all(&bytes))

@@ -3,12 +3,13 @@
 mod checkpoint;
 mod control;
 mod fields;
+mod guard;
 mod recording;
 mod state;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::AtomicUsize;
 use std::time::{Duration, Instant};
 
 use grainwake_formats::summary::EndReason;
@@ -17,23 +18,19 @@ use grainwake_run::case::quantity::Time;
 use grainwake_run::number_format::{number_of_grains, quantity as seconds};
 use grainwake_run::{Recording, Watch, admit_memory};
 use grainwake_solver::sim::{SAME_TIME, Simulation};
-use pyo3::exceptions::{PyBufferError, PyRuntimeError};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use crate::arguments::{Whole, quantity};
 use crate::case::PyCase;
-use crate::error::{Raise, input, numerics, warn};
+use crate::error::{Raise, input, warn};
 use crate::running::check_progress;
 use crate::threads;
+use guard::{Ended, changing, computing, reading};
 use recording::Failure;
 
 /// Wall time after which signals are handled.
 const INTERVAL: Duration = Duration::from_millis(50);
-
-/// Message of a simulation whose run folder is closed.
-const CLOSED: &str = "the run folder is closed: continue it with Simulation(case, output=..., \
-                      resume=True), and a later end if the case had ended";
 
 /// Simulation of a case, step by step, with grains that can be controlled between the steps.
 ///
@@ -60,7 +57,8 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 ///     Reading or writing failed.
 ///
 /// RuntimeError
-///     Another thread uses the simulation; each of its methods and attributes may raise this.
+///     Another thread uses the simulation; each of its methods and attributes may raise this. Or
+///     the process was made by ``fork`` from that of the simulation; see Notes.
 ///
 /// Warns
 /// -----
@@ -73,10 +71,14 @@ const CLOSED: &str = "the run folder is closed: continue it with Simulation(case
 /// time, also to read it. Ctrl-C raises ``KeyboardInterrupt`` after a step, and the simulation can
 /// be continued.
 ///
+/// A process made by ``fork`` can read the arrays of the grains, but all else raises RuntimeError:
+/// the threads of the solver are those of its parent.
+///
 /// With `output`, steps end at the output times of the case as well. If nothing is controlled and
 /// no other times are asked for, the results are those of `Case.run`. Steps beyond the end of the
 /// case are refused. Call `finish` at the end, or use a ``with`` block: it calls `finish`, or after
-/// an exception `checkpoint`. The folder is locked until then.
+/// an exception `checkpoint`. The folder is locked until then. If the folder cannot be written,
+/// further steps repeat the ``OSError``, and `save_checkpoint` keeps the state in another place.
 ///
 /// A stop condition of the case (``time.stop``) ends `run`; `ended` tells loops of your own.
 ///
@@ -110,22 +112,10 @@ pub struct PySimulation {
     pool: Arc<ThreadPool>,
     /// Number of arrays that show the fields.
     views: Arc<AtomicUsize>,
-    /// Message of the failed step.
-    failed: Option<String>,
-}
-
-/// Message of a simulation that another thread uses.
-const IN_USE: &str = "the simulation is in use by another call, such as a step in another thread: \
-                      only one thread may use a simulation at a time";
-
-/// Returns a simulation to be read; refuses while another thread changes it.
-fn reading<'py>(slf: &Bound<'py, PySimulation>) -> PyResult<PyRef<'py, PySimulation>> {
-    slf.try_borrow().map_err(|_| PyRuntimeError::new_err(IN_USE))
-}
-
-/// Returns a simulation to be changed; refuses while another thread uses it.
-fn changing<'py>(slf: &Bound<'py, PySimulation>) -> PyResult<PyRefMut<'py, PySimulation>> {
-    slf.try_borrow_mut().map_err(|_| PyRuntimeError::new_err(IN_USE))
+    /// Failure that ended the steps.
+    failed: Option<Ended>,
+    /// Process that made the threads.
+    process: u32,
 }
 
 /// Returns the watch of the stop condition of a simulation in memory, if the case has one.
@@ -134,45 +124,6 @@ fn watch(case: &Case, sim: &Simulation) -> Option<Watch> {
 }
 
 impl PySimulation {
-    /// Refuses a change of the fields that arrays show, or after a failed step.
-    fn may_change(&self) -> PyResult<()> {
-        self.may_continue()?;
-        self.has_no_views()
-    }
-
-    /// Refuses a change of the fields that arrays show.
-    fn has_no_views(&self) -> PyResult<()> {
-        match self.views.load(Ordering::Acquire) {
-            0 => Ok(()),
-            count => {
-                let (noun, verb) = if count == 1 { ("array", "shows") } else { ("arrays", "show") };
-                Err(PyBufferError::new_err(format!(
-                    "{count} {noun} still {verb} the velocity or pressure of the present step: copy \
-                     what is needed later (array.copy()) and delete the arrays before the next step"
-                )))
-            }
-        }
-    }
-
-    /// Refuses to use a simulation that has failed.
-    fn has_not_failed(&self) -> PyResult<()> {
-        match &self.failed {
-            Some(message) => {
-                Err(numerics(format!("{message}\nThe simulation cannot be continued.")))
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses to use a simulation that has failed or whose run folder is closed.
-    fn may_continue(&self) -> PyResult<()> {
-        self.has_not_failed()?;
-        if self.output.is_some() && self.recording.is_none() {
-            return Err(input(CLOSED));
-        }
-        Ok(())
-    }
-
     /// Returns the stop condition of the case, if it holds.
     fn stopped(&self) -> Option<EndReason> {
         stopped(&self.sim, self.recording.as_ref(), self.watch.as_ref()).or(self.closed_by)
@@ -207,11 +158,10 @@ impl PySimulation {
                 Ok(false) => py.check_signals()?,
                 Err(error @ Failure::End(_)) => return Err(error).raise(),
                 Err(error) => {
-                    let message = error.to_string();
-                    let raised = Err(error).raise();
-                    self.failed = Some(message);
-                    self.recording = None;
-                    return raised;
+                    let recording = self.recording.take();
+                    let sound = recording.is_some_and(|recording| !recording.step_failed());
+                    self.failed = Some(error.ended(sound));
+                    return Err(error).raise();
                 }
             }
         }
@@ -266,8 +216,18 @@ impl PySimulation {
         };
         let watch = if recording.is_none() { watch(given, &sim) } else { None };
         let (views, closed_by) = (Arc::default(), None);
-        let failed = None;
-        Ok(PySimulation { sim, recording, watch, closed_by, output, case, pool, views, failed })
+        Ok(PySimulation {
+            sim,
+            recording,
+            watch,
+            closed_by,
+            output,
+            case,
+            pool,
+            views,
+            failed: None,
+            process: std::process::id(),
+        })
     }
 
     /// Take one time step.

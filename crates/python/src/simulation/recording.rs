@@ -6,10 +6,11 @@ use grainwake_run::case::Case;
 use grainwake_run::number_format::quantity;
 use grainwake_run::{Options, Recording, RunError, Watch};
 use grainwake_solver::sim::{Simulation, StepError};
+use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use super::{PySimulation, changing, reading};
+use super::{Ended, PySimulation, changing, reading};
 use crate::error::{IntoException, Raise, input, warn};
 use crate::running::{command, existing};
 
@@ -39,6 +40,19 @@ impl IntoException for Failure {
             Failure::Step(error) => error.into_exception(),
             Failure::Run(error) => error.into_exception(),
             Failure::End(_) => input(self.to_string()),
+        }
+    }
+}
+
+impl Failure {
+    /// Returns the failure that ends the steps; `sound` says whether the state is that of the last
+    /// step.
+    pub(super) fn ended(&self, sound: bool) -> Ended {
+        match self {
+            Failure::Run(error @ RunError::Io { source, .. }) if sound => {
+                Ended::Output(source.kind(), error.to_string())
+            }
+            other => Ended::Step(other.to_string()),
         }
     }
 }
@@ -143,7 +157,8 @@ impl PySimulation {
     /// SolverError
     ///     A step has failed.
     /// OSError
-    ///     Writing failed; ``resume=True`` continues from the last checkpoint.
+    ///     Writing failed; ``resume=True`` continues from the last checkpoint, and
+    ///     `save_checkpoint` keeps the present state in another place.
     ///
     /// Notes
     /// -----
@@ -154,10 +169,15 @@ impl PySimulation {
         let (py, mut this) = (slf.py(), changing(slf)?);
         this.may_write()?;
         let folder = this.output.clone();
-        let PySimulation { pool, sim, recording, closed_by, .. } = &mut *this;
+        let PySimulation { pool, sim, recording, closed_by, failed, .. } = &mut *this;
         if let Some(recording) = recording.take() {
             *closed_by = recording.stopped(sim);
-            py.detach(|| pool.install(|| recording.finish(sim))).raise()?;
+            let finished = py.detach(|| pool.install(|| recording.finish(sim)));
+            if let Err(error) = finished {
+                let error = Failure::Run(error);
+                *failed = Some(error.ended(true));
+                return Err(error).raise();
+            }
         }
         drop(this);
         if let (true, Some(folder)) = (report, &folder) {
@@ -188,6 +208,12 @@ impl PySimulation {
         let mut this = changing(slf)?;
         this.closed_by = this.stopped();
         this.recording = None;
+        if let Err(error) = &written
+            && error.is_instance_of::<PyOSError>(slf.py())
+        {
+            let why = error.value(slf.py()).to_string();
+            this.failed.get_or_insert(Ended::Output(std::io::ErrorKind::Other, why));
+        }
         written.map(|()| false)
     }
 }

@@ -8,7 +8,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::{PySimulation, reading};
+use super::{PySimulation, computing, reading};
 use crate::arrays::{numbers, read_only, rows, vectors};
 
 /// Returns one vector per grain.
@@ -49,7 +49,7 @@ impl PySimulation {
     ///     max_divergence [1/s], max_velocity [m/s], cfl, slip [m/s], fluid_kinetic_energy [J],
     ///     grain_kinetic_energy [J], momentum [kg m/s], momentum_residual (relative).
     fn diagnostics<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-        let (py, this) = (slf.py(), reading(slf)?);
+        let (py, this) = (slf.py(), computing(slf)?);
         let PySimulation { pool, sim, .. } = &*this;
         let d = py.detach(|| pool.install(|| sim.diagnostics()));
         let dict = PyDict::new(py);
