@@ -1,13 +1,14 @@
 //! `Study`: many runs of one case.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Options, Outcome, Plan, Selection, Study, StudyObserver, execute, records, write_tables,
+    Options, Outcome, Plan, Selection, Study, StudyObserver, execute, records, replaced,
+    write_tables,
 };
 use pyo3::prelude::*;
 
@@ -112,6 +113,8 @@ impl PyStudy {
     ///     Keep the checkpoints of finished runs.
     /// accept : list of str, optional
     ///     Commits of other programs whose finished runs count, 12 hexadecimal digits each.
+    /// force : bool, default False
+    ///     Replace finished runs in the folder whose case, end or program is another one.
     /// progress : bool or callable, optional
     ///     True shows a bar over the runs, False none; a callable receives a dict with done, runs
     ///     and messages.
@@ -123,11 +126,14 @@ impl PyStudy {
     ///
     /// Raises
     /// ------
+    /// CaseError
+    ///     The folder holds finished runs of other overrides, which `force` would replace; the
+    ///     message names them, and nothing has changed.
     /// CaseError, SolverError, OSError
     ///     A run failed; the message lists the failed runs, the others are finished.
     /// KeyboardInterrupt
     ///     The study was interrupted; the same call continues it.
-    #[pyo3(signature = (folder, *, only = None, jobs = 1, threads = 0, retry = false, keep_checkpoints = false, accept = None, progress = None))]
+    #[pyo3(signature = (folder, *, only = None, jobs = 1, threads = 0, retry = false, keep_checkpoints = false, accept = None, force = false, progress = None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
@@ -138,6 +144,7 @@ impl PyStudy {
         retry: bool,
         keep_checkpoints: bool,
         accept: Option<Vec<String>>,
+        force: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         check_progress(py, progress)?;
@@ -149,6 +156,9 @@ impl PyStudy {
             .map_err(|problem| refused(&[problem]))?;
         let jobs = jobs.clamp(1, chosen.len().max(1));
         let (jobs, each) = threads::share(py, jobs, threads)?;
+        if !force {
+            refuse_replacement(plan, &chosen, &folder)?;
+        }
         plan.create_folder(&folder).raise()?;
         let options = Options {
             jobs,
@@ -217,6 +227,31 @@ impl PyStudy {
     fn __repr__(&self) -> String {
         format!("Study({:?}, {} runs)", self.plan.title, self.plan.runs.len())
     }
+}
+
+/// Number of runs that a message names.
+const NAMED: usize = 10;
+
+/// Refuses to replace finished runs of another case or program.
+fn refuse_replacement(plan: &Plan, chosen: &[usize], folder: &Path) -> PyResult<()> {
+    plan.check_folder(folder).raise()?;
+    let found = replaced(&plan.runs, chosen, folder);
+    if found.is_empty() {
+        return Ok(());
+    }
+    let mut named: Vec<String> =
+        found.iter().take(NAMED).map(|(run, why)| format!("{} ({why})", run.name)).collect();
+    if found.len() > NAMED {
+        named.push(format!("{} more", found.len() - NAMED));
+    }
+    let (noun, them) = if found.len() == 1 { ("run", "it") } else { ("runs", "them") };
+    Err(input(format!(
+        "{} holds {} finished {noun} that would be replaced: {}; give another folder, or replace \
+         {them} with force=True; accept=[commit] counts those of another program",
+        folder.display(),
+        found.len(),
+        named.join(", ")
+    )))
 }
 
 /// Raises the exception of the worst failure.

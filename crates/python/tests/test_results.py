@@ -402,3 +402,34 @@ def test_progress_is_a_bool_or_a_callable(case, tmp_path):
             case.run(tmp_path / "run", progress=wrong)
     assert not (tmp_path / "run").exists()
     case.run(tmp_path / "run", progress=np.bool_(False), report=False)
+
+
+def test_finished_runs_of_other_overrides_are_not_replaced(case_file, tmp_path):
+    study_file = tmp_path / "study.toml"
+    study_file.write_text(f"""
+title = "Two densities"
+base = "{case_file}"
+[[axis]]
+name = "density"
+key = "grain.0.density"
+values = [{{ name = "light", value = 1500 }}, {{ name = "heavy", value = 2500 }}]
+""")
+    folder = tmp_path / "out"
+    keys = {"time.end": "4 ms"}
+    light, heavy = gw.Study.load(study_file, keys).runs
+    results = gw.Study.load(study_file, keys).run(folder, only=light, progress=False)
+    files = {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    other = gw.Study.load(study_file, {**keys, "fluid.viscosity": "2 mPa s"})
+    with pytest.raises(gw.CaseError, match=f"1 finished run .*: {light} .its case has changed.*force"):
+        other.run(folder, progress=False)
+    later = gw.Study.load(study_file, {"time.end": "6 ms"})
+    with pytest.raises(gw.CaseError, match=f"1 finished run .*: {light} "):
+        later.run(folder, progress=False)
+    assert {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()} == files
+    # A run that is not chosen is not replaced, and a finished run of the same overrides is kept.
+    other.run(folder, only=heavy, progress=False)
+    other.run(folder, progress=False, force=True)
+    assert len(results.run(light).grains) and "kinematic_viscosity = 0.000002" in (
+        results.run(light).case().resolved
+    )
+    other.run(folder, progress=False)

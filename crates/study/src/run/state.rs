@@ -108,6 +108,21 @@ pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     }
 }
 
+/// Returns the chosen runs whose folders hold a finished run of another case, end or program, each
+/// with the reason. [`execute`](crate::execute) replaces them.
+pub fn replaced<'a>(
+    runs: &'a [Run],
+    chosen: &[usize],
+    study: &Path,
+) -> Vec<(&'a Run, &'static str)> {
+    let finished = |run: &Run| run.folder(study).join(summary::FILE).is_file();
+    let stale = |run: &'a Run| match folder_state(run, study) {
+        RunState::Stale(why) if finished(run) => Some((run, why)),
+        _ => None,
+    };
+    chosen.iter().filter_map(|index| stale(&runs[*index])).collect()
+}
+
 /// Determines the state of a run by its run folder. The finished run of an accepted program counts.
 pub(crate) fn folder_state(run: &Run, study: &Path) -> RunState {
     let folder = run.folder(study);
