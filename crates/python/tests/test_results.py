@@ -404,6 +404,12 @@ def test_progress_is_a_bool_or_a_callable(case, tmp_path):
     case.run(tmp_path / "run", progress=np.bool_(False), report=False)
 
 
+def test_listed_files_that_are_missing_are_noted(broken):
+    shutil.rmtree(broken / "slices")
+    with pytest.warns(gw.CaseWarning, match="slices: 3 of 3 files that run.pvd lists are missing"):
+        gw.open(broken)
+
+
 def test_finished_runs_of_other_overrides_are_not_replaced(case_file, tmp_path):
     study_file = tmp_path / "study.toml"
     study_file.write_text(f"""

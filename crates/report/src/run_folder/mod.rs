@@ -1,21 +1,23 @@
 //! Contents of a run folder.
 
 mod facts;
+mod frames;
 mod history;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use serde_json::Value;
 
+use grainwake_formats::events;
 use grainwake_formats::events::{Event, EventKind};
 use grainwake_formats::table::{Damage, Table};
-use grainwake_formats::vti::{self, Image};
+use grainwake_formats::vti::Image;
 use grainwake_formats::vtp::{self, Surface};
-use grainwake_formats::{events, pvd};
 
 use crate::error::ReportError;
+use frames::read_image;
 
 pub use facts::Facts;
 pub use history::{History, histories, histories_with};
@@ -279,76 +281,11 @@ impl RunFolder {
     pub(crate) fn left_out(&self, frame: &FrameFile, what: &str) -> String {
         format!("{} was left out: {what}", self.short_name(&frame.file))
     }
-
-    fn collection(&mut self) -> BTreeMap<String, f64> {
-        let file = self.path.join("run.pvd");
-        let entries = if file.is_file() { pvd::read(&file) } else { Ok(Vec::new()) };
-        let entries = entries.unwrap_or_else(|what| {
-            self.notes.push(format!("run.pvd could not be read ({what})"));
-            Vec::new()
-        });
-        entries.into_iter().map(|entry| (entry.file, entry.time)).collect()
-    }
-
-    /// Lists the files of a subfolder with their times, from `run.pvd` or else from the files.
-    fn frames(
-        &mut self,
-        folder: &str,
-        extension: &str,
-        times: &BTreeMap<String, f64>,
-    ) -> Vec<FrameFile> {
-        let Ok(entries) = std::fs::read_dir(self.path.join(folder)) else {
-            return Vec::new();
-        };
-        let mut files: Vec<PathBuf> =
-            entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
-        files.retain(|file| file.extension().is_some_and(|e| e == extension));
-        files.sort();
-        let mut out = Vec::new();
-        for file in files {
-            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let listed = times.get(&format!("{folder}/{name}")).copied();
-            let time = listed.map(Ok).unwrap_or_else(|| time_inside(&file, extension));
-            match time {
-                Ok(time) => out.push(FrameFile { grain: grain_of_name(&name), file, time }),
-                Err(what) => self.notes.push(format!("{folder}/{name} was left out: {what}")),
-            }
-        }
-        out.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.grain.cmp(&b.grain)));
-        out
-    }
-}
-
-fn time_inside(file: &Path, extension: &str) -> Result<f64, String> {
-    let time = match extension {
-        "vti" => Some(read_image(file)?.frame.time),
-        _ => vtp::read(file)?.time,
-    };
-    time.filter(|t| t.is_finite()).ok_or_else(|| "it holds no time".to_owned())
-}
-
-fn read_image(file: &Path) -> Result<Image, String> {
-    vti::read(file).map_err(|error| error.to_string())
-}
-
-/// Returns the number after "grain" in a file name such as `grain1_000040.vti`.
-fn grain_of_name(name: &str) -> Option<usize> {
-    let rest = name.split("grain").nth(1)?.trim_start_matches(['_', '-', '.']);
-    let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
-    digits.parse().ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_tell_the_grain() {
-        assert_eq!(grain_of_name("grain1_000040.vti"), Some(1));
-        assert_eq!(grain_of_name("slice_000040_grain_0.vti"), Some(0));
-        assert_eq!(grain_of_name("centre_000040.vti"), None);
-        assert_eq!(grain_of_name("grains_000040.vtp"), None);
-    }
 
     #[test]
     fn periodic_axes_wrap() {
