@@ -3,28 +3,45 @@
 use glam::DVec3;
 use grainwake_run::case::quantity::{Kind, parse_quantity, without_unit};
 use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::PyOverflowError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyString};
+use pyo3::types::{PyBool, PyDict, PyFrozenSet, PySet, PyString};
 
 use crate::error::input;
 
-/// Whole number of any size; `at_least` checks it.
+/// Value of an argument that takes a whole number of any size; `at_least` and `number` check it.
 pub struct Whole {
     /// The number; none beyond 128 bits.
     number: Option<i128>,
     text: String,
+    /// Type of a value that is no whole number.
+    other: Option<String>,
 }
 
 impl Whole {
+    /// Returns the number, none beyond 128 bits, or the exception of a value of another type. The
+    /// message names the argument, which that of the conversion does not.
+    pub fn number(&self, name: &str) -> PyResult<Option<i128>> {
+        let Some(other) = &self.other else { return Ok(self.number) };
+        let found = &self.text;
+        Err(PyTypeError::new_err(format!(
+            "{name}: found {found} of type {other}; expected a whole number"
+        )))
+    }
+
+    /// Returns the value as Python writes it.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Returns the number, or the exception of one below `least` or beyond the type.
     pub fn at_least<T: TryFrom<i128>>(&self, name: &str, least: i128) -> PyResult<T> {
-        let found = &self.text;
-        if self.number.map_or(found.starts_with('-'), |number| number < least) {
+        let (given, found) = (self.number(name)?, &self.text);
+        if given.map_or(found.starts_with('-'), |number| number < least) {
             let expected = format!("expected a whole number from {least} on");
             return Err(input(format!("{name}: found {found}; {expected}")));
         }
-        let number = self.number.and_then(|number| T::try_from(number).ok());
+        let number = given.and_then(|number| T::try_from(number).ok());
         number.ok_or_else(|| input(format!("{name}: {found} is too large")))
     }
 }
@@ -33,13 +50,16 @@ impl<'py> FromPyObject<'_, 'py> for Whole {
     type Error = PyErr;
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Whole> {
-        match value.extract::<i128>() {
-            Ok(number) => Ok(Whole { number: Some(number), text: number.to_string() }),
-            Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
-                Ok(Whole { number: None, text: value.str()?.to_cow()?.into_owned() })
-            }
-            Err(error) => Err(error),
+        let (number, mut other) = match value.extract::<i128>() {
+            Ok(number) => (Some(number), None),
+            Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => (None, None),
+            Err(_) => (None, Some(value.get_type().name()?.to_string())),
+        };
+        // True is an integer of Python, but no count.
+        if value.is_instance_of::<PyBool>() {
+            other = Some("bool".to_owned());
         }
+        Ok(Whole { number, text: value.str()?.to_cow()?.into_owned(), other })
     }
 }
 
@@ -72,6 +92,52 @@ pub fn threads(value: &Bound<'_, PyAny>) -> PyResult<usize> {
     value.extract::<Whole>()?.at_least("threads", 0)
 }
 
+/// Defines conversions of arguments whose exceptions name the argument; those of PyO3 name it in a
+/// note only, which Python 3.10 does not show.
+macro_rules! named {
+    ($convert:path, $type:ty, $($name:ident)*) => {
+        $(
+            pub fn $name(value: &pyo3::Bound<'_, pyo3::PyAny>) -> pyo3::PyResult<$type> {
+                $convert(stringify!($name), value)
+            }
+        )*
+    };
+}
+
+/// Arguments that are True or False.
+pub mod flags {
+    named!(super::flag, bool, flip force from_mask keep_checkpoints labels largest_piece median pad
+        report rescue resume retry rotation roundness split translation);
+}
+
+/// Arguments that are plain numbers.
+pub mod plain {
+    named!(super::plain_number, f64, roundness sphericity);
+    named!(super::optional_number, Option<f64>, flatness separate smoothing);
+}
+
+/// Returns True or False.
+fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    value.extract().map_err(|_| wrong_type(name, value, "True or False"))
+}
+
+/// Returns a number.
+fn plain_number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
+    value.extract().map_err(|_| wrong_type(name, value, "a number"))
+}
+
+/// Returns a number or None.
+fn optional_number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+    if value.is_none() { Ok(None) } else { plain_number(name, value).map(Some) }
+}
+
+/// Returns the exception of an argument of a wrong type.
+fn wrong_type(name: &str, value: &Bound<'_, PyAny>, expected: &str) -> PyErr {
+    let shown = value.repr().map_or_else(|_| "a value".into(), |text| text.to_string());
+    let kind = value.get_type().name().map_or_else(|_| String::new(), |kind| kind.to_string());
+    PyTypeError::new_err(format!("{name}: found {shown} of type {kind}; expected {expected}"))
+}
+
 /// Returns a quantity in SI units: a number is SI, a string carries its unit ("2 mm").
 pub fn quantity<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     if let Ok(text) = value.cast::<PyString>() {
@@ -100,6 +166,9 @@ pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> 
     if value.is_instance_of::<PyString>() {
         return Err(refused("a string"));
     }
+    if is_unordered(value) {
+        return Err(refused("a set or dict, which has no order"));
+    }
     let items: Vec<Bound<'_, PyAny>> = match value.try_iter() {
         Ok(items) => items.collect::<PyResult<_>>()?,
         Err(_) => return Err(refused("one value")),
@@ -112,11 +181,19 @@ pub fn vector<K: Kind>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<DVec3> 
     Ok(DVec3::new(part("x", x)?, part("y", y)?, part("z", z)?))
 }
 
+/// Returns whether a value is a set or a dict, whose items have no order.
+pub fn is_unordered(value: &Bound<'_, PyAny>) -> bool {
+    value.is_instance_of::<PySet>()
+        || value.is_instance_of::<PyFrozenSet>()
+        || value.is_instance_of::<PyDict>()
+}
+
 /// Returns `N` plain numbers of a sequence or an array.
 pub fn plain_numbers<const N: usize>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
     let items: PyResult<Vec<f64>> =
         value.try_iter().and_then(|items| items.map(|item| item?.extract()).collect());
-    items.ok().and_then(|items| items.try_into().ok()).ok_or_else(|| {
+    let items = items.ok().filter(|_| !is_unordered(value));
+    items.and_then(|items| items.try_into().ok()).ok_or_else(|| {
         let found = value.repr().map_or_else(|_| "a value".into(), |text| text.to_string());
         input(format!("{name}: found {found}; expected {N} numbers"))
     })

@@ -8,7 +8,7 @@ use grainwake_run::threads::resolve;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arguments::{Whole, whole};
+use crate::arguments::{Whole, flags, whole};
 use crate::arrays::json;
 use crate::case_dict::{override_list, to_toml};
 use crate::error::{IntoException, Raise, refused_dict, system};
@@ -208,11 +208,11 @@ impl PyCase {
         &self,
         py: Python<'py>,
         folder: PathBuf,
-        resume: bool,
-        force: bool,
+        #[pyo3(from_py_with = flags::resume)] resume: bool,
+        #[pyo3(from_py_with = flags::force)] force: bool,
         start_from: Option<PathBuf>,
         threads: Option<Whole>,
-        report: bool,
+        #[pyo3(from_py_with = flags::report)] report: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let threads = self.threads(py, threads.as_ref())?;

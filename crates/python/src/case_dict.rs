@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyMapping, PyString};
 use toml::{Table, Value};
 
+use crate::arguments::is_unordered;
 use crate::error::{Raise, input, system};
 use crate::grain::PyGrain;
 use grainwake_run::case::write_toml;
@@ -53,8 +54,10 @@ fn table(path: &str, mapping: &Bound<'_, PyMapping>, store: Option<&Path>) -> Py
     let mut table = Table::new();
     for item in mapping.items()?.iter() {
         let (key, given): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
-        let key: String =
-            key.extract().map_err(|_| input(format!("{path}: the key {key} is not a string")))?;
+        let key: String = key.extract().map_err(|_| {
+            let place = if path.is_empty() { String::new() } else { format!("{path}: ") };
+            input(format!("{place}the key {key} is not a string"))
+        })?;
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
         if let Some(value) = value(&path, &given, store)? {
             table.insert(key, value);
@@ -106,6 +109,9 @@ fn value(path: &str, given: &Bound<'_, PyAny>, store: Option<&Path>) -> PyResult
     }
     if let Ok(mapping) = given.cast::<PyMapping>() {
         return Ok(Some(Value::Table(table(path, mapping, store)?)));
+    }
+    if is_unordered(given) {
+        return Err(input(format!("{path}: found a set, which has no order; expected a list")));
     }
     let Ok(items) = given.try_iter() else {
         let kind = given.get_type().name()?;

@@ -12,6 +12,7 @@ use grainwake_study::{
 };
 use pyo3::prelude::*;
 
+use crate::arguments::flags;
 use crate::arrays::json;
 use crate::case_dict::override_list;
 use crate::error::{Raise, input, numerics, refused, system, warn};
@@ -90,7 +91,8 @@ impl PyStudy {
         overrides: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyStudy> {
         let set = override_list(overrides, None)?;
-        let plan = py.detach(|| Plan::resolve(&Study::read(&path)?, &set)).raise()?;
+        let read = |stop: &_| Plan::resolve_until(&Study::read(&path)?, &set, stop);
+        let plan = running::interruptible(py, read)?.raise()?;
         Ok(PyStudy { plan })
     }
 
@@ -141,10 +143,10 @@ impl PyStudy {
         only: Option<&str>,
         #[pyo3(from_py_with = crate::arguments::jobs)] jobs: usize,
         #[pyo3(from_py_with = crate::arguments::threads)] threads: usize,
-        retry: bool,
-        keep_checkpoints: bool,
+        #[pyo3(from_py_with = flags::retry)] retry: bool,
+        #[pyo3(from_py_with = flags::keep_checkpoints)] keep_checkpoints: bool,
         accept: Option<Vec<String>>,
-        force: bool,
+        #[pyo3(from_py_with = flags::force)] force: bool,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         check_progress(py, progress)?;

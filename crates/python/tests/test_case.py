@@ -241,6 +241,7 @@ class Twin:
     ({"time": {"end": object()}}, "time.end: found a value of type object"),
     ({"time": {"end": [1, None]}}, "time.end.1: found None"),
     ({"time": {1: 2}}, "time: the key 1 is not a string"),
+    ({1: 2}, "^the key 1 is not a string"),
     ({"time": {"end": 2**70}}, "is too large"),
     ({"grain": [{"shape": gw.Grain.sphere("1 mm")}]}, "stands for the key `file`"),
 ])

@@ -204,8 +204,25 @@ def test_counts_are_whole_numbers():
     ]:
         with pytest.raises(gw.CaseError, match=words):
             call()
-    with pytest.raises(TypeError):
-        gw.Grain.ellipsoid("1 mm", "1 mm", "1 mm", cells=20.5)
+    for call, words in [
+        (lambda: gw.Grain.ellipsoid(1e-3, 1e-3, 1e-3, cells=20.5),
+         "cells: found 20.5 of type float; expected a whole number"),
+        (lambda: gw.Grain.sphere("1 mm", nodes=True), "nodes: found True of type bool"),
+        (lambda: gw.Grain.family(0.7, 0.4, seed="1"), "seed: found 1 of type str"),
+        (lambda: gw.Grain.family("0.7", 0.4), "sphericity: found '0.7' of type str; expected a num"),
+        (lambda: gw.scan(ball(), voxel=1, separate="1"), "separate: found '1' of type str"),
+        (lambda: gw.scan(ball(), voxel=1, median=1), "median: found 1 of type int; expected True or"),
+    ]:
+        with pytest.raises(TypeError, match=words):
+            call()
+
+
+def test_sets_are_no_vectors():
+    with pytest.raises(gw.CaseError, match="exponents: found {"):
+        gw.Grain.superquadric("1 mm", "1 mm", "1 mm", exponents={1.0, 1.5})
+    entry = gw.Grain.sphere("1 mm").at({1e-3, 2e-3, 3e-3}, density=2500)
+    with pytest.raises(gw.CaseError, match="grain.0.position: found a set, which has no order"):
+        gw.Case.new(size=["4 mm"] * 3, end=1, grains=[entry])
 
 
 def test_an_entry_has_one_shape():

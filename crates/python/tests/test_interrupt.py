@@ -18,10 +18,13 @@ def interrupted(work, after):
     sender = threading.Timer(after, lambda: signal.raise_signal(signal.SIGINT))
     sender.start()
     started = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    sender.join()
-    return time.monotonic() - started - after
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        return time.monotonic() - started - after
+    finally:
+        sender.cancel()
+        sender.join()
 
 
 def test_an_interrupt_ends_a_scan():
@@ -34,13 +37,40 @@ def test_an_interrupt_ends_a_scan():
     assert interrupted(lambda: gw.scan(image, voxel="20 um"), 0.3) < 5
 
 
+# Random places at this solid fraction take minutes.
+PACKING = {
+    "count": 600,
+    "shapes": [{"kind": "capsule", "diameter": "0.4 mm", "height": "0.8 mm"}],
+    "density": 2650,
+    "arrangement": "random",
+}
+BOX = {"size": ["6 mm"] * 3, "cell_size": "0.1 mm"}
+WATER = {"density": 1000, "viscosity": "1 mPa s"}
+
+
 def test_an_interrupt_ends_a_packing():
-    rod = {"kind": "capsule", "diameter": "0.4 mm", "height": "0.8 mm"}
-    packing = {"count": 600, "shapes": [rod], "density": 2650, "arrangement": "random"}
-    # Random places at this solid fraction take minutes.
-    ended = interrupted(
-        lambda: gw.Case.new(size=["6 mm"] * 3, cell_size="0.1 mm", end="1 ms",
-                            fluid={"density": 1000, "viscosity": "1 mPa s"}, packing=[packing]),
-        0.5,
-    )
-    assert ended < 5
+    make = lambda: gw.Case.new(**BOX, end="1 ms", fluid=WATER, packing=[PACKING])
+    assert interrupted(make, 0.5) < 5
+
+
+def test_an_interrupt_ends_the_reading_of_a_study(tmp_path):
+    (tmp_path / "case.toml").write_text("""
+domain = { size = ["6 mm", "6 mm", "6 mm"], cell_size = "0.1 mm" }
+fluid = { density = 1000, viscosity = "1 mPa s" }
+time = { end = "1 ms" }
+[[packing]]
+count = 600
+shapes = [{ kind = "capsule", diameter = "0.4 mm", height = "0.8 mm" }]
+density = 2650
+arrangement = "random"
+""")
+    study = tmp_path / "study.toml"
+    study.write_text("""
+title = "Two ends"
+base = "case.toml"
+[[axis]]
+name = "end"
+key = "time.end"
+values = [{ name = "short", value = "1 ms" }, { name = "long", value = "2 ms" }]
+""")
+    assert interrupted(lambda: gw.Study.load(study), 0.5) < 5

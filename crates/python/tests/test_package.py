@@ -101,6 +101,7 @@ sim.step(np.float32(1e-6))
 gw.Grain.superquadric(size, size, size, exponents=np.array([1, 1]))
 gw.scan(np.zeros((9, 9, 9)), voxel=size, threshold=np.float32(3), separate=np.float32(0.9))
 gw.open_run("out").slice(np.float32(1e-3))
+gw.Study.load("study.toml").run("out", force=True)
 """)
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", str(script)],

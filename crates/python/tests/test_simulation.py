@@ -293,6 +293,17 @@ def test_wrong_control_is_refused(sim):
     sim.set_load(0, force=[0, 0, "2 uN"], torque=["1 nN m", 0, 0])
 
 
+def test_sets_and_truth_values_are_refused_as_vectors_and_indices(sim):
+    for other in ({1, 2, 3}, frozenset((1, 2, 3)), {1: 1, 2: 2, 3: 3}):
+        with pytest.raises(gw.CaseError, match="velocity: found a set or dict, which has no order"):
+            sim.set_velocity(0, velocity=other)
+    for other in (True, 0.0, "0"):
+        with pytest.raises(TypeError, match="grain: found .* expected a whole number"):
+            sim.set_load(other)
+    with pytest.raises(IndexError, match=f"no grain {2**200}"):
+        sim.set_load(2**200)
+
+
 def test_grains_have_indices_of_numpy(sim):
     sim.set_load(np.int64(0), force=[0, 0, "1 uN"])
     sim.prescribe_motion(np.uint8(0), [0, 0, 0])

@@ -16,7 +16,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use super::PyGrain;
-use crate::arguments::{Whole, array, plain_numbers, points, quantity, seed, whole, wrong_shape};
+use crate::arguments::{
+    Whole, array, flags, plain, plain_numbers, points, quantity, seed, whole, wrong_shape,
+};
 use crate::error::{Raise, input, refused};
 
 /// Returns the options of the resolution.
@@ -266,7 +268,7 @@ impl PyGrain {
         py: Python<'_>,
         mesh: &Bound<'_, PyAny>,
         unit: Option<&Bound<'_, PyAny>>,
-        flip: bool,
+        #[pyo3(from_py_with = flags::flip)] flip: bool,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
         cells: Option<Whole>,
         nodes: Option<Whole>,
@@ -317,10 +319,10 @@ impl PyGrain {
     #[pyo3(signature = (sphericity, roundness, equivalent_diameter = None, *, flatness = None, seed = 1, cells = None, nodes = None))]
     fn family(
         py: Python<'_>,
-        sphericity: f64,
-        roundness: f64,
+        #[pyo3(from_py_with = plain::sphericity)] sphericity: f64,
+        #[pyo3(from_py_with = plain::roundness)] roundness: f64,
         equivalent_diameter: Option<&Bound<'_, PyAny>>,
-        flatness: Option<f64>,
+        #[pyo3(from_py_with = plain::flatness)] flatness: Option<f64>,
         #[pyo3(from_py_with = seed)] seed: u64,
         cells: Option<Whole>,
         nodes: Option<Whole>,

@@ -15,7 +15,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arguments::{pixels, quantity};
+use crate::arguments::{flags, pixels, quantity};
 use crate::arrays::{json, numbers, read_only, rows, vectors};
 use crate::error::{Raise, input};
 
@@ -81,7 +81,12 @@ impl PyGrain {
     /// force : bool, default False
     ///     Replace an existing file.
     #[pyo3(signature = (path, *, force = false))]
-    fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        #[pyo3(from_py_with = flags::force)] force: bool,
+    ) -> PyResult<()> {
         if path.extension().is_none_or(|e| e != "grain") {
             let other = path.with_extension("grain");
             return Err(input(format!(

@@ -21,7 +21,7 @@ use grainwake_solver::sim::{SAME_TIME, Simulation};
 use pyo3::prelude::*;
 use rayon::ThreadPool;
 
-use crate::arguments::{Whole, quantity};
+use crate::arguments::{Whole, flags, quantity};
 use crate::case::PyCase;
 use crate::error::{Raise, input, warn};
 use crate::running::check_progress;
@@ -192,8 +192,8 @@ impl PySimulation {
         case: Py<PyCase>,
         threads: Option<Whole>,
         output: Option<PathBuf>,
-        resume: bool,
-        force: bool,
+        #[pyo3(from_py_with = flags::resume)] resume: bool,
+        #[pyo3(from_py_with = flags::force)] force: bool,
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
         let threads = case.get().threads(py, threads.as_ref())?;

@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use rayon::ThreadPool;
 
 use super::{Ended, PySimulation, changing, reading};
+use crate::arguments::flags;
 use crate::error::{IntoException, Raise, input, warn};
 use crate::running::{command, existing};
 
@@ -165,7 +166,10 @@ impl PySimulation {
     /// The simulation can still be read, but not stepped. A run that is finished before the end of
     /// the case is continued by ``resume=True``.
     #[pyo3(signature = (*, report = true))]
-    fn finish<'py>(slf: &Bound<'py, Self>, report: bool) -> PyResult<Bound<'py, PyAny>> {
+    fn finish<'py>(
+        slf: &Bound<'py, Self>,
+        #[pyo3(from_py_with = flags::report)] report: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let (py, mut this) = (slf.py(), changing(slf)?);
         this.may_write()?;
         let folder = this.output.clone();

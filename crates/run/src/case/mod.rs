@@ -103,7 +103,7 @@ impl Case {
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Case, CaseError> {
-        Case::load_sharing(path, overrides, &ClosedForms::default())
+        Case::load_until(path, overrides, &NEVER)
     }
 
     /// Reads a case file as [`Case::load`], until another thread sets `stop`.
@@ -115,22 +115,14 @@ impl Case {
         overrides: &[String],
         stop: &AtomicBool,
     ) -> Result<Case, CaseError> {
-        Case::read(path, overrides, &ClosedForms::default(), stop)
+        Case::load_sharing(path, overrides, &ClosedForms::default(), stop)
     }
 
-    /// Reads a case file as [`Case::load`], and takes its closed forms from `shapes`.
+    /// Reads a case file as [`Case::load_until`], and takes its closed forms from `shapes`.
     ///
     /// # Errors
-    /// [`CaseError`] with every problem found and its place.
+    /// As [`Case::load_until`].
     pub fn load_sharing(
-        path: &Path,
-        overrides: &[String],
-        shapes: &ClosedForms,
-    ) -> Result<Case, CaseError> {
-        Case::read(path, overrides, shapes, &NEVER)
-    }
-
-    fn read(
         path: &Path,
         overrides: &[String],
         shapes: &ClosedForms,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use grainwake_run::case::{Case, CaseError, ClosedForms, Problem};
 use grainwake_run::provenance::Provenance;
@@ -22,10 +23,22 @@ impl Plan {
     /// [`StudyError::Invalid`] with the problems of the first invalid model, located in the study
     /// file where it sets the key.
     pub fn resolve(study: &Study, sets: &[String]) -> Result<Plan, StudyError> {
+        Plan::resolve_until(study, sets, &AtomicBool::new(false))
+    }
+
+    /// Resolves every model as [`Plan::resolve`], until another thread sets `stop`.
+    ///
+    /// # Errors
+    /// As [`Plan::resolve`], and [`CaseError::Interrupted`].
+    pub fn resolve_until(
+        study: &Study,
+        sets: &[String],
+        stop: &AtomicBool,
+    ) -> Result<Plan, StudyError> {
         let shapes = ClosedForms::default();
         let all = (0..study.models.len()).into_par_iter();
         let resolved: Vec<Result<Vec<Run>, StudyError>> =
-            all.map(|i| runs_of(study, i, sets, &shapes)).collect();
+            all.map(|i| runs_of(study, i, sets, (&shapes, stop))).collect();
         let mut runs = Vec::new();
         for found in resolved {
             runs.extend(found?);
@@ -58,13 +71,13 @@ fn runs_of(
     study: &Study,
     index: usize,
     sets: &[String],
-    shapes: &ClosedForms,
+    (shapes, stop): (&ClosedForms, &AtomicBool),
 ) -> Result<Vec<Run>, StudyError> {
     let model = &study.models[index];
     let own = model.settings.iter().map(|s| s.text());
     let set: Vec<String> = own.chain(sets.iter().cloned()).collect();
     let load = |set: &[String]| {
-        Case::load_sharing(&model.base, set, shapes)
+        Case::load_sharing(&model.base, set, shapes, stop)
             .map_err(|error| locate_in_study(study, model, error))
     };
     let case = load(&set)?;
@@ -74,7 +87,7 @@ fn runs_of(
         for member in 1..ensemble.members {
             let mut set = set.clone();
             set.extend(member_overrides(study, model, ensemble, member, &case)?);
-            let case = Case::load_sharing(&model.base, &set, shapes)
+            let case = Case::load_sharing(&model.base, &set, shapes, stop)
                 .map_err(|error| locate_in_ensemble(study, ensemble, model, member, error))?;
             runs.push(run(model, member, set, &case)?);
         }
