@@ -220,7 +220,7 @@ impl PyCase {
         let parent = start_from.map(|from| running::parent(py, &self.case, &from)).transpose()?;
         running::run(py, &self.case, &folder, existing, parent, threads, progress)?;
         if report {
-            py.detach(|| grainwake_report::render(&folder))
+            threads::detached(py, || grainwake_report::render(&folder))?
                 .map_err(IntoException::into_exception)?;
         }
         py.import("grainwake._studies")?.call_method1("open", (folder,))
@@ -243,13 +243,14 @@ impl PyCase {
         threads: Option<Whole>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let threads = self.threads(py, threads.as_ref())?;
-        json(py, &self.case.estimate(threads))
+        json(py, &threads::detached(py, || self.case.estimate(threads))?)
     }
 
     /// Warnings about settings that impair the results.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.case.estimate(resolve(self.case.threads, |_| {})).warnings
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let threads = resolve(self.case.threads, |_| {});
+        Ok(threads::detached(py, || self.case.estimate(threads))?.warnings)
     }
     /// Title, one line.
     #[getter]

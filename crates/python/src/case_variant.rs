@@ -10,6 +10,7 @@ use crate::case::{DICT, PyCase, grain_store};
 use crate::case_dict::override_list;
 use crate::error::{Raise, input, refused_dict};
 use crate::running::interruptible;
+use crate::threads::detached;
 
 /// Constructor of a pickled case and its arguments.
 type Reduced<'py> = (Bound<'py, PyAny>, (String, Vec<(String, Bound<'py, PyBytes>)>, String));
@@ -65,7 +66,7 @@ impl PyCase {
         origin: &str,
     ) -> PyResult<PyCase> {
         let grains = grains.into_iter().map(|(name, bytes)| (name, Arc::new(bytes))).collect();
-        let case = py.detach(|| Case::from_resolved(resolved, grains)).raise()?;
+        let case = detached(py, || Case::from_resolved(resolved, grains))?.raise()?;
         let origin = serde_json::from_str(origin).map_err(|error| input(error.to_string()))?;
         Ok(PyCase { case: case.with_origin(origin) })
     }

@@ -16,6 +16,7 @@ use pyo3::types::PyDict;
 use crate::arguments::quantity;
 use crate::arrays::{json, numbers, rows, vectors};
 use crate::error::{IntoException, Raise, input, system};
+use crate::threads::detached;
 
 /// Content of a table, and notes on unfinished lines.
 type Content<'py> = (Bound<'py, PyDict>, Vec<String>);
@@ -103,7 +104,7 @@ pub fn _read_surface(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict
 /// Writes the figures and the page of a run folder or a study folder; returns the page and notes.
 #[pyfunction]
 pub fn _render(py: Python<'_>, folder: PathBuf) -> PyResult<(PathBuf, Vec<String>)> {
-    py.detach(|| {
+    detached(py, || {
         if Plan::exists_in(&folder) {
             let done = grainwake_study::render(&folder).map_err(IntoException::into_exception)?;
             return Ok((done.page, done.notes));
@@ -111,7 +112,7 @@ pub fn _render(py: Python<'_>, folder: PathBuf) -> PyResult<(PathBuf, Vec<String
         let done = grainwake_report::render(&folder)
             .map_err(|error: ReportError| error.into_exception())?;
         Ok((done.page, done.notes))
-    })
+    })?
 }
 
 /// Missing, unfinished or damaged parts of a run folder.

@@ -72,13 +72,14 @@ pub fn attended<T: Send>(
     })
 }
 
-/// Runs `work` on another thread, and sets its flag if a signal handler raises an exception.
+/// Runs `work` on the common threads, and sets its flag if a signal handler raises an exception.
 pub fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&AtomicBool) -> T + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
-    match attended(py, &stop, || work(&stop), |_| Ok(()))? {
+    let work = threads::on_common(|| work(&stop))?;
+    match attended(py, &stop, work, |_| Ok(()))? {
         (result, None) => Ok(result),
         (_, Some(error)) => Err(error),
     }
@@ -170,7 +171,7 @@ pub fn run(
     let options =
         Options { existing, command: command(py)?, threads, parent, controlled_from: None };
     let display = py.import("grainwake._progress")?.call_method1("of_run", (progress,))?;
-    let warnings = case.estimate(threads).warnings;
+    let warnings = threads::detached(py, || case.estimate(threads))?.warnings;
     display.call_method1("warn", (warnings,))?;
     let work = || {
         let mut relay = Relay { shared: &shared, stop: stop.clone() };

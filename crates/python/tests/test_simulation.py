@@ -679,3 +679,20 @@ def test_a_simulation_is_refused_in_a_process_made_by_fork(case):
     assert len(told) == 3 and all('start method "spawn"' in text for text in told)
     assert positions == sim.positions.tolist()
     sim.step()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_process_made_by_fork_has_threads_of_its_own(case):
+    # The parent has started the threads that build grains and cases.
+    make = lambda: gw.Grain.ellipsoid("2 mm", "1.6 mm", "1 mm", cells=24)
+    grain = make()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        same = make() == grain
+        entry = make().at(["2 mm", "2 mm", "4 mm"], density=2500)
+        gw.Simulation(gw.Case.new(size=["4 mm", "4 mm", "8 mm"], end=1, grains=[entry])).step()
+        os._exit(0 if same else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert make() == grain

@@ -20,6 +20,7 @@ use crate::arguments::{
     Whole, array, flags, plain, plain_numbers, points, quantity, seed, whole, wrong_shape,
 };
 use crate::error::{Raise, input, refused};
+use crate::threads::detached;
 
 /// Returns the options of the resolution.
 pub(super) fn options(cells: Option<&Whole>, nodes: Option<&Whole>) -> PyResult<ShapeOptions> {
@@ -60,7 +61,7 @@ fn closed_form(
     build: impl FnOnce(&ShapeOptions) -> grainwake_shape::Result<Shape> + Send,
 ) -> PyResult<PyGrain> {
     let options = options(cells, nodes)?;
-    let shape = py.detach(|| build(&options)).raise()?;
+    let shape = detached(py, || build(&options))?.raise()?;
     let help = "check the lengths: a number is in m, a string has its unit, such as \"2 mm\"; \
                 scaled() gives a grain any size";
     plausible(&shape, help)?;
@@ -281,16 +282,16 @@ impl PyGrain {
                     "unit: it is missing; give the length of one unit of the file, such as \"mm\"",
                 )
             })?;
-            py.detach(|| {
+            detached(py, || {
                 let (mesh, source) = read_mesh(&path, unit, &ReadLimits::default())?;
                 shape_from_mesh(&mesh, &source, &how)
-            })
+            })?
         } else {
             let raw = triangles(mesh)?;
-            py.detach(|| {
+            detached(py, || {
                 let (mesh, source) = mesh_from_memory(&raw, unit.unwrap_or(1.0))?;
                 shape_from_mesh(&mesh, &source, &how)
-            })
+            })?
         };
         sized(built.raise()?, equivalent_diameter, "unit").map(PyGrain::new)
     }
@@ -334,7 +335,7 @@ impl PyGrain {
         how.cells = whole("cells", cells.as_ref(), 1)?.or(how.cells);
         let mut target = FamilyTarget::new(sphericity, roundness, diameter);
         target.flatness = flatness.unwrap_or(target.flatness);
-        py.detach(|| family_grain(&target, seed, &how)).raise().map(PyGrain::new)
+        detached(py, || family_grain(&target, seed, &how))?.raise().map(PyGrain::new)
     }
 }
 

@@ -18,6 +18,7 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::arguments::{flags, pixels, quantity};
 use crate::arrays::{json, numbers, read_only, rows, vectors};
 use crate::error::{Raise, input};
+use crate::threads::detached;
 
 pub use image::PyScan;
 
@@ -47,10 +48,10 @@ impl PyGrain {
 
     /// Returns views from three sides as PNG.
     fn drawn<'py>(&self, py: Python<'py>, pixels: usize) -> PyResult<Bound<'py, PyBytes>> {
-        let drawn = py.detach(|| {
+        let drawn = detached(py, || {
             let panel = GrainPanel::three_sides("", &self.shape, pixels, false);
             sheet(vec![panel], 1)?.to_png()
-        });
+        })?;
         Ok(PyBytes::new(py, &drawn.map_err(input)?))
     }
 }
@@ -69,7 +70,7 @@ impl PyGrain {
     /// Grain
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<PyGrain> {
-        py.detach(|| Shape::load(&path)).raise().map(PyGrain::new)
+        detached(py, || Shape::load(&path))?.raise().map(PyGrain::new)
     }
 
     /// Write a ``.grain`` file, which cases refer to.
@@ -105,8 +106,9 @@ impl PyGrain {
     }
 
     #[staticmethod]
-    fn _from_bytes(bytes: &[u8]) -> PyResult<PyGrain> {
-        Shape::from_bytes(bytes, "pickled grain".as_ref()).raise().map(PyGrain::new)
+    fn _from_bytes(py: Python<'_>, bytes: &[u8]) -> PyResult<PyGrain> {
+        let shape = detached(py, || Shape::from_bytes(bytes, "pickled grain".as_ref()))?;
+        shape.raise().map(PyGrain::new)
     }
 
     fn __reduce__<'py>(

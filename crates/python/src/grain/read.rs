@@ -17,6 +17,7 @@ use super::volume;
 use crate::arguments::{Whole, quantity, whole};
 use crate::error::{Raise, input, warn};
 use crate::running::interruptible;
+use crate::threads::detached;
 
 /// Options of a scan as Python gives them.
 pub(super) struct Given {
@@ -68,12 +69,11 @@ pub(super) fn read(
     let voxel = quantity::<Length>("voxel", voxel)?;
     let how = given.options(voxel, threshold.map(segmentation).transpose()?)?;
     let scanned = if let Ok(path) = image.extract::<PathBuf>() {
-        let (volume, source, stated) = py
-            .detach(|| {
-                let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
-                read_volume_and_voxel(&path, &limits)
-            })
-            .raise()?;
+        let (volume, source, stated) = detached(py, || {
+            let limits = ReadLimits::of_this_machine(how.bytes_per_voxel());
+            read_volume_and_voxel(&path, &limits)
+        })?
+        .raise()?;
         let other = stated.filter(|stated| stated.contradicts(voxel)).map(|stated| {
             let file = path.display();
             format!(

@@ -197,7 +197,7 @@ impl PySimulation {
     ) -> PyResult<PySimulation> {
         let given = &case.get().case;
         let threads = case.get().threads(py, threads.as_ref())?;
-        warn(py, given.estimate(threads).warnings)?;
+        warn(py, threads::detached(py, || given.estimate(threads))?.warnings)?;
         let pool = threads::pool(threads)?;
         let (sim, recording) = match &output {
             Some(folder) => {

@@ -14,6 +14,7 @@ use super::{Ended, PySimulation, changing, reading};
 use crate::arguments::flags;
 use crate::error::{IntoException, Raise, input, warn};
 use crate::running::{command, existing};
+use crate::threads::detached;
 
 /// Name of this program in the provenance.
 const PROGRAM: &str = "Python";
@@ -185,7 +186,7 @@ impl PySimulation {
         }
         drop(this);
         if let (true, Some(folder)) = (report, &folder) {
-            py.detach(|| grainwake_report::render(folder)).raise()?;
+            detached(py, || grainwake_report::render(folder))?.raise()?;
         }
         py.import("grainwake._studies")?.call_method1("open", (folder,))
     }
