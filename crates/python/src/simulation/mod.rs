@@ -27,7 +27,7 @@ use crate::error::{Raise, input, warn};
 use crate::running::check_progress;
 use crate::threads;
 use guard::{Ended, changing, computing, reading};
-use recording::Failure;
+use recording::{Failure, left, stopped};
 
 /// Wall time after which signals are handled.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -166,21 +166,6 @@ impl PySimulation {
             }
         }
     }
-}
-
-/// Returns the time from now until `end` [s]; none if it has passed, or is too near for a step.
-fn left(sim: &Simulation, end: f64) -> Option<f64> {
-    let left = end - sim.time();
-    (left >= (SAME_TIME * end).max(sim.least_horizon()) && left > 0.0).then_some(left)
-}
-
-/// Returns the stop condition of the case, if it holds.
-fn stopped(
-    sim: &Simulation,
-    recording: Option<&Recording>,
-    watch: Option<&Watch>,
-) -> Option<EndReason> {
-    recording.map_or_else(|| watch?.stopped(sim), |recording| recording.stopped(sim))
 }
 
 #[pymethods]

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use grainwake_formats::summary::EndReason;
 use grainwake_run::case::Case;
 use grainwake_run::number_format::quantity;
 use grainwake_run::{Options, Recording, RunError, Watch};
-use grainwake_solver::sim::{Simulation, StepError};
+use grainwake_solver::sim::{SAME_TIME, Simulation, StepError};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
@@ -78,6 +79,21 @@ pub(super) fn step(
     }
     recording.step(sim, horizon)?;
     Ok(())
+}
+
+/// Returns the time from now until `end` [s]; none if it has passed, or is too near for a step.
+pub(super) fn left(sim: &Simulation, end: f64) -> Option<f64> {
+    let left = end - sim.time();
+    (left >= (SAME_TIME * end).max(sim.least_horizon()) && left > 0.0).then_some(left)
+}
+
+/// Returns the stop condition of the case, if it holds.
+pub(super) fn stopped(
+    sim: &Simulation,
+    recording: Option<&Recording>,
+    watch: Option<&Watch>,
+) -> Option<EndReason> {
+    recording.map_or_else(|| watch?.stopped(sim), |recording| recording.stopped(sim))
 }
 
 /// Opens a run folder and builds its simulation; `(resume, force)` treat an existing run.
