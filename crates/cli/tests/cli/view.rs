@@ -58,7 +58,8 @@ fn grains_without_surface_files_come_from_their_descriptions() {
     let run = saved(&out, "run-0");
     assert_eq!(run["meshes"], serde_json::json!([{"kind": "sphere"}]));
     assert_eq!(run["grains"][1]["scale"], 1.5e-3);
-    assert_eq!(run["notes"], serde_json::json!([]));
+    let note = "grains: 2 of 2 files that run.pvd lists are missing";
+    assert_eq!(run["notes"], serde_json::json!([note]));
 }
 
 #[test]
