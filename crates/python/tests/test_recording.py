@@ -52,7 +52,7 @@ def test_a_time_beside_an_output_takes_no_short_step(tmp_path):
     with gw.Simulation(case, output=tmp_path / "run") as sim:
         states = list(sim.run(every=1 / 300, progress=False))
     assert [state.time for state in states] == pytest.approx([n / 300 for n in range(7)])
-    times = gw.open(tmp_path / "run").grain(0)["time"]
+    times = gw.open(tmp_path / "run").grain(0).index
     assert list(times) == pytest.approx([n / 300 for n in range(7)], abs=1e-6)
 
 
