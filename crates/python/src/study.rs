@@ -234,7 +234,7 @@ impl PyStudy {
 /// Number of runs that a message names.
 const NAMED: usize = 10;
 
-/// Refuses to replace finished runs of another case or program.
+/// Refuses to replace finished runs of another case or end.
 fn refuse_replacement(plan: &Plan, chosen: &[usize], folder: &Path) -> PyResult<()> {
     plan.check_folder(folder).raise()?;
     let found = replaced(&plan.runs, chosen, folder);
@@ -249,7 +249,7 @@ fn refuse_replacement(plan: &Plan, chosen: &[usize], folder: &Path) -> PyResult<
     let (noun, them) = if found.len() == 1 { ("run", "it") } else { ("runs", "them") };
     Err(input(format!(
         "{} holds {} finished {noun} that would be replaced: {}; give another folder, or replace \
-         {them} with force=True; accept=[commit] counts those of another program",
+         {them} with force=True",
         folder.display(),
         found.len(),
         named.join(", ")

@@ -108,8 +108,11 @@ pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     }
 }
 
-/// Returns the chosen runs whose folders hold a finished run of another case, end or program, each
-/// with the reason. [`execute`](crate::execute) replaces them.
+/// Reason of a run by another program, which a study repeats without being asked.
+const OTHER_PROGRAM: &str = "another version of the program produced it";
+
+/// Returns the chosen runs whose folders hold a finished run of another case or end, each with the
+/// reason. [`execute`](crate::execute) replaces them.
 pub fn replaced<'a>(
     runs: &'a [Run],
     chosen: &[usize],
@@ -117,7 +120,7 @@ pub fn replaced<'a>(
 ) -> Vec<(&'a Run, &'static str)> {
     let finished = |run: &Run| run.folder(study).join(summary::FILE).is_file();
     let stale = |run: &'a Run| match folder_state(run, study) {
-        RunState::Stale(why) if finished(run) => Some((run, why)),
+        RunState::Stale(why) if finished(run) && why != OTHER_PROGRAM => Some((run, why)),
         _ => None,
     };
     chosen.iter().filter_map(|index| stale(&runs[*index])).collect()
@@ -134,7 +137,7 @@ pub(crate) fn folder_state(run: &Run, study: &Path) -> RunState {
     }
     let (finished, id) = (folder.join(summary::FILE).is_file(), run.id_by(&found));
     if id != run.id && !(finished && run.accepted_ids.contains(&id)) {
-        return RunState::Stale("another version of the program produced it");
+        return RunState::Stale(OTHER_PROGRAM);
     }
     if finished {
         return match ending_in(&folder) {
