@@ -8,6 +8,7 @@ gap; forces are relative to the exact one (validation/lubrication/reference/seri
     grid       force of the fluid on the grid
     whole      with the lubrication force before decision 0030, (1/h - 1/h_0) with h_0 of one cell
     shorter    with the same force for h_0 of 0.6 cells at the floor, 0.3 between spheres
+    wall       with the force of decision 0030, but at a slip floor that of a no-slip floor
     present    with the force of decision 0030
     s          value of s for which the sum is exact
 
@@ -94,8 +95,8 @@ def at(points, gap):
     raise ValueError(gap)
 
 
-# Films of 1 / `thickness` cells in gaps of one cell, force of a film of one cell over 6 pi mu R v
-# times the cells, s, and the shorter h_0 [cells].
+# Thickness of the film over the gap, force of a film of one cell over 6 pi mu R v and the cells per
+# diameter, s, and the shorter h_0 [cells].
 SURFACES = {
     "floor": (1, 1 / 2, 0.35, 0.6),
     "slip floor": (2, 1 / 4, 0.35, 0.6),
@@ -107,10 +108,8 @@ def compare(onto, cells, gap, points):
     """Returns the forces at a gap [cells] over the exact one, and s."""
     thickness, strength, share, shorter = SURFACES[onto]
     half = (2 if onto == "sphere" else 1) * (cells / 2)
-    if onto == "floor":
-        exact = series.series(series.towards_wall, acosh(1 + gap / half))
-    else:
-        exact = series.series(series.towards_sphere, acosh(1 + gap / half))
+    law = series.towards_wall if onto == "floor" else series.towards_sphere
+    exact = series.series(law, acosh(1 + gap / half))
     grid = at(points, gap / cells)
     film, scale = thickness * gap, strength * cells
     lubrication = lambda h, seen, scale: scale * max(1 / h - 1 / max(seen, h), 0)
@@ -120,6 +119,7 @@ def compare(onto, cells, gap, points):
         grid,
         grid + lubrication(gap, 1, former),
         grid + lubrication(gap, shorter, former),
+        grid + lubrication(gap, gap + share * (1 - gap), former),
         grid + lubrication(film, film + share * (1 - film), scale),
     ]
     seen = 1 / (1 / film - (exact - grid) / scale)
@@ -137,7 +137,7 @@ def main():
                     rows.append([onto, cells, gap, *compare(onto, cells, gap, points)])
     with (HERE / "approach.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow("surface cells gap_cells grid whole shorter present s".split())
+        writer.writerow("surface cells gap_cells grid whole shorter wall present s".split())
         writer.writerows(rows)
 
 

@@ -116,7 +116,7 @@ impl PyStudy {
     /// accept : list of str, optional
     ///     Commits of other programs whose finished runs count, 12 hexadecimal digits each.
     /// force : bool, default False
-    ///     Replace finished runs in the folder whose case, end or program is another one.
+    ///     Replace finished runs in the folder whose case or end is another one.
     /// progress : bool or callable, optional
     ///     True shows a bar over the runs, False none; a callable receives a dict with done, runs
     ///     and messages.

@@ -27,7 +27,7 @@ use crate::error::{Raise, input, warn};
 use crate::running::check_progress;
 use crate::threads;
 use guard::{Ended, changing, computing, reading};
-use recording::{Failure, left, stopped};
+use recording::{Failure, stopped};
 
 /// Wall time after which signals are handled.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -272,12 +272,13 @@ impl PySimulation {
     ///     As in `step`.
     fn advance_to(slf: &Bound<'_, Self>, time: &Bound<'_, PyAny>) -> PyResult<()> {
         let until = quantity::<Time>("time", time)?;
-        changing(slf)?.advance(slf.py(), |sim, _| left(sim, until))
+        changing(slf)?.advance(slf.py(), |sim, _| sim.time_left(until))
     }
 
     /// Advances to a time [s], or until the stop condition of the case holds.
     fn _advance(slf: &Bound<'_, Self>, time: f64) -> PyResult<()> {
-        let horizon = |sim: &_, stopped| if stopped { None } else { left(sim, time) };
+        let horizon =
+            |sim: &Simulation, stopped: bool| if stopped { None } else { sim.time_left(time) };
         changing(slf)?.advance(slf.py(), horizon)
     }
 

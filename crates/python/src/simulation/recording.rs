@@ -6,7 +6,7 @@ use grainwake_formats::summary::EndReason;
 use grainwake_run::case::Case;
 use grainwake_run::number_format::quantity;
 use grainwake_run::{Options, Recording, RunError, Watch};
-use grainwake_solver::sim::{SAME_TIME, Simulation, StepError};
+use grainwake_solver::sim::{Simulation, StepError};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use rayon::ThreadPool;
@@ -79,12 +79,6 @@ pub(super) fn step(
     }
     recording.step(sim, horizon)?;
     Ok(())
-}
-
-/// Returns the time from now until `end` [s]; none if it has passed, or is too near for a step.
-pub(super) fn left(sim: &Simulation, end: f64) -> Option<f64> {
-    let left = end - sim.time();
-    (left >= (SAME_TIME * end).max(sim.least_horizon()) && left > 0.0).then_some(left)
 }
 
 /// Returns the stop condition of the case, if it holds.

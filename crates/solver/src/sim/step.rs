@@ -7,7 +7,8 @@ use super::{AdvanceError, Simulation, StepError};
 pub const SAME_TIME: f64 = 1e-9;
 
 impl Simulation {
-    /// Advances the simulation to `time` [s], in steps of which the last ends there.
+    /// Advances the simulation to `time` [s], in steps of which the last ends there. A time less
+    /// than [`Self::least_horizon`] away counts as reached.
     ///
     /// # Errors
     /// [`AdvanceError::NotFinite`] if `time` is not finite; [`AdvanceError::Step`] as in
@@ -16,12 +17,16 @@ impl Simulation {
         if !time.is_finite() {
             return Err(AdvanceError::NotFinite { time });
         }
-        while self.clock.time < time * (1.0 - SAME_TIME)
-            && time - self.clock.time >= self.least_horizon()
-        {
-            self.step(time - self.clock.time)?;
+        while let Some(left) = self.time_left(time) {
+            self.step(left)?;
         }
         Ok(())
+    }
+
+    /// Time from now until `end` [s]; none if it has passed, or is too near for a step.
+    pub fn time_left(&self, end: f64) -> Option<f64> {
+        let left = end - self.clock.time;
+        (left > SAME_TIME * end && left >= self.least_horizon()).then_some(left)
     }
 
     /// Shortest horizon of a step [s], a thousandth of the last step: a shorter step disturbs the

@@ -12,6 +12,10 @@ use serde::{Deserialize, Serialize};
 use crate::error::{StudyError, read_rows};
 use crate::plan::{Run, TABLE, end_condition};
 
+/// Reasons why a run folder belongs to another run.
+const OTHER_CASE: &str = "its case has changed";
+const OTHER_END: &str = "its end time has changed";
+
 /// State of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RunState {
@@ -108,22 +112,24 @@ pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     }
 }
 
-/// Reason of a run by another program, which a study repeats without being asked.
-const OTHER_PROGRAM: &str = "another version of the program produced it";
-
 /// Returns the chosen runs whose folders hold a finished run of another case or end, each with the
-/// reason. [`execute`](crate::execute) replaces them.
+/// reason. [`execute`](crate::execute) replaces them. Runs that differ by the program alone are not
+/// listed: their repetition gives the results of the present program.
 pub fn replaced<'a>(
     runs: &'a [Run],
     chosen: &[usize],
     study: &Path,
 ) -> Vec<(&'a Run, &'static str)> {
-    let finished = |run: &Run| run.folder(study).join(summary::FILE).is_file();
-    let stale = |run: &'a Run| match folder_state(run, study) {
-        RunState::Stale(why) if finished(run) && why != OTHER_PROGRAM => Some((run, why)),
-        _ => None,
+    let differs = |run: &Run| {
+        let folder = run.folder(study);
+        let found = Provenance::read(&folder).filter(|_| folder.join(summary::FILE).is_file())?;
+        if found.case_sha256 != run.case_sha256 {
+            return Some(OTHER_CASE);
+        }
+        // A damaged file is a failure of the run, which replaces nothing.
+        ending_in(&folder).ok().filter(|ending| *ending != run.ending).map(|_| OTHER_END)
     };
-    chosen.iter().filter_map(|index| stale(&runs[*index])).collect()
+    chosen.iter().filter_map(|n| differs(&runs[*n]).map(|why| (&runs[*n], why))).collect()
 }
 
 /// Determines the state of a run by its run folder. The finished run of an accepted program counts.
@@ -133,16 +139,16 @@ pub(crate) fn folder_state(run: &Run, study: &Path) -> RunState {
         return RunState::Missing;
     };
     if found.case_sha256 != run.case_sha256 {
-        return RunState::Stale("its case has changed");
+        return RunState::Stale(OTHER_CASE);
     }
     let (finished, id) = (folder.join(summary::FILE).is_file(), run.id_by(&found));
     if id != run.id && !(finished && run.accepted_ids.contains(&id)) {
-        return RunState::Stale(OTHER_PROGRAM);
+        return RunState::Stale("another version of the program produced it");
     }
     if finished {
         return match ending_in(&folder) {
             Ok(ending) if ending == run.ending => RunState::Finished,
-            Ok(_) => RunState::Stale("its end time has changed"),
+            Ok(_) => RunState::Stale(OTHER_END),
             Err(why) => RunState::Damaged(why),
         };
     }

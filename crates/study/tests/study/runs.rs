@@ -9,7 +9,7 @@ use crate::files::STUDY;
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
     Archive, Options, Outcome, Plan, RunRecord, RunState, StateKind, Study, StudyError,
-    StudyObserver, execute, records, render, run_state, to_csv, write_tables,
+    StudyObserver, execute, records, render, replaced, run_state, to_csv, write_tables,
 };
 
 struct Quiet;
@@ -86,11 +86,16 @@ fn finished_runs_are_kept_and_stale_ones_repeated() {
     // A changed end time is stale too, although the case hash does not include it.
     let longer = Plan::resolve(&Study::read(&path).unwrap(), &["time.end=0.07".into()]).unwrap();
     assert!(states(&longer, &study).iter().all(|s| matches!(s, RunState::Stale(_))));
+    // Runs of another case or end count as results that are replaced, those of another program not.
+    let all: Vec<usize> = (0..second.runs.len()).collect();
+    let replaced_by = |plan: &Plan| replaced(&plan.runs, &all, &study).len();
+    assert_eq!((replaced_by(&first), replaced_by(&second), replaced_by(&longer)), (2, 0, 5));
     // Another version of the program.
     let file = study.join("runs/alone/provenance.json");
     let text = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, text.replace("\"version\": \"", "\"version\": \"0.0.")).unwrap();
     assert!(matches!(states(&second, &study)[4], RunState::Stale(why) if why.contains("version")));
+    assert_eq!((replaced_by(&second), replaced_by(&longer)), (0, 5));
 }
 
 #[test]
