@@ -10,7 +10,7 @@ use grainwake_run::number_format::size;
 use grainwake_study::{
     Analysis, Archive, MANIFEST, Options, Outcome, Plan, RESTORE, Run, RunRecord, RunState,
     Selection, StudyError, execute, expected_cost, note_on_unmeasured, one_per_grid, records,
-    run_state, time_steps, write_tables,
+    refuse_to_replace, run_state, time_steps, write_tables,
 };
 
 use crate::args::{self, StudyArgs};
@@ -33,6 +33,9 @@ impl From<StudyError> for Exit {
             ),
             StudyError::Occupied { .. } => {
                 Exit::refused(error.to_string(), "give another folder with -o")
+            }
+            StudyError::WouldReplace { .. } => {
+                Exit::refused(error.to_string(), "give another folder with -o, or use --force")
             }
             StudyError::Damaged { ref file, .. } => {
                 let help = if file.file_name().is_some_and(|name| name == MANIFEST) {
@@ -86,6 +89,10 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     }
     if let Some(note) = plan.damage_in(&folder) {
         tell!("note: {note}");
+    }
+    if !args.force {
+        plan.check_folder(&folder)?;
+        refuse_to_replace(runs, &chosen, &folder)?;
     }
     plan.create_folder(&folder)?;
     let outdated = Archive::read(&folder)?.outdated(runs);
@@ -168,10 +175,13 @@ fn conclude(runs: &[Run], ended: &[(usize, Outcome)], stopped: bool) -> Result<(
     };
     let lines: Vec<String> =
         failed.iter().map(|(name, why, _)| format!("{name}: {}", first_line(why))).collect();
+    // A run that could not begin, such as a damaged one, is no run to restart.
+    let unstable = failed.iter().any(|(.., kind)| *kind == FailureKind::Computation);
+    let retry = if unstable { "; --retry restarts unstable runs" } else { "" };
     Err(Exit::with_help(
         exit_code(worst),
         format!("{} of {} runs failed:\n{}", failed.len(), ended.len(), lines.join("\n")),
-        "the other chosen runs have ended; --retry restarts failed runs",
+        format!("the other chosen runs have ended{retry}"),
     ))
 }
 

@@ -233,6 +233,9 @@ impl IntoException for StudyError {
             StudyError::Case(error) => error.into_exception(),
             StudyError::Report(error) => error.into_exception(),
             StudyError::Io { ref source, .. } => system(source.kind(), self.to_string()),
+            StudyError::WouldReplace { .. } => {
+                input(format!("{self}; give another folder, or use force=True"))
+            }
             other => input(other.to_string()),
         }
     }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
-    Options, Outcome, Plan, Selection, Study, StudyObserver, execute, records, replaced,
+    Options, Outcome, Plan, Selection, Study, StudyObserver, execute, records, refuse_to_replace,
     write_tables,
 };
 use pyo3::prelude::*;
@@ -159,7 +159,8 @@ impl PyStudy {
         let jobs = jobs.clamp(1, chosen.len().max(1));
         let (jobs, each) = threads::share(py, jobs, threads)?;
         if !force {
-            refuse_replacement(plan, &chosen, &folder)?;
+            plan.check_folder(&folder).raise()?;
+            refuse_to_replace(&plan.runs, &chosen, &folder).raise()?;
         }
         plan.create_folder(&folder).raise()?;
         let options = Options {
@@ -229,31 +230,6 @@ impl PyStudy {
     fn __repr__(&self) -> String {
         format!("Study({:?}, {} runs)", self.plan.title, self.plan.runs.len())
     }
-}
-
-/// Number of runs that a message names.
-const NAMED: usize = 10;
-
-/// Refuses to replace finished runs of another case or end.
-fn refuse_replacement(plan: &Plan, chosen: &[usize], folder: &Path) -> PyResult<()> {
-    plan.check_folder(folder).raise()?;
-    let found = replaced(&plan.runs, chosen, folder);
-    if found.is_empty() {
-        return Ok(());
-    }
-    let mut named: Vec<String> =
-        found.iter().take(NAMED).map(|(run, why)| format!("{} ({why})", run.name)).collect();
-    if found.len() > NAMED {
-        named.push(format!("{} more", found.len() - NAMED));
-    }
-    let (noun, them) = if found.len() == 1 { ("run", "it") } else { ("runs", "them") };
-    Err(input(format!(
-        "{} holds {} finished {noun} that would be replaced: {}; give another folder, or replace \
-         {them} with force=True",
-        folder.display(),
-        found.len(),
-        named.join(", ")
-    )))
 }
 
 /// Raises the exception of the worst failure.

@@ -35,6 +35,14 @@ pub enum StudyError {
         /// Contents of the folder.
         what: String,
     },
+    /// The folder holds finished runs of other cases or ends, which would be replaced.
+    #[error("{}", would_replace(folder, runs))]
+    WouldReplace {
+        /// The folder.
+        folder: PathBuf,
+        /// Names of the runs, each with the reason.
+        runs: Vec<(String, &'static str)>,
+    },
     /// The steps of a run could not be timed.
     #[error("{run} cannot be timed: {what}")]
     NotTimed {
@@ -62,6 +70,19 @@ impl From<Problem> for StudyError {
     fn from(problem: Problem) -> Self {
         StudyError::Invalid(vec![problem])
     }
+}
+
+/// Message of [`StudyError::WouldReplace`], which names the first runs.
+fn would_replace(folder: &Path, runs: &[(String, &'static str)]) -> String {
+    const NAMED: usize = 10;
+    let mut named: Vec<String> =
+        runs.iter().take(NAMED).map(|(name, why)| format!("{name} ({why})")).collect();
+    if runs.len() > NAMED {
+        named.push(format!("{} more", runs.len() - NAMED));
+    }
+    let noun = if runs.len() == 1 { "run" } else { "runs" };
+    let (folder, count) = (folder.display(), runs.len());
+    format!("{folder} holds {count} finished {noun} that would be replaced: {}", named.join(", "))
 }
 
 /// Adds the action and the file to an error of the operating system.

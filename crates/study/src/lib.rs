@@ -38,6 +38,6 @@ pub use plan::expand::{Model, Setting};
 pub use plan::file::{Ensemble, Study};
 pub use plan::selection::Selection;
 pub use plan::{MANIFEST, Plan, RUNS, Run};
-pub use run::state::{Archive, RunState, StateKind, replaced, run_state};
+pub use run::state::{Archive, RunState, StateKind, refuse_to_replace, run_state};
 pub use run::step_time::{StepTime, time_steps};
 pub use run::{Options, Outcome, RESTORE, StudyObserver, execute};

@@ -172,6 +172,9 @@ pub struct StudyArgs {
     /// Restart failed runs
     #[arg(long)]
     pub retry: bool,
+    /// Replace finished runs of another case or end
+    #[arg(long)]
+    pub force: bool,
     /// Count finished runs by this commit of the program (12 digits), if its results are identical;
     /// repeatable
     #[arg(long, value_name = "COMMIT")]

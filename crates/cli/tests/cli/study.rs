@@ -116,9 +116,35 @@ fn a_finished_run_with_a_damaged_case_is_a_failure_and_stays() {
     );
     for more in [&[][..], &["--retry"]] {
         let failed = run(more).code(2).stderr(contains("case.resolved.toml cannot be read"));
-        failed.stderr(contains("remove its folder and its row"));
+        failed.stderr(contains("remove its folder and its row").and(contains("--retry").not()));
         assert!(before == crate::common::contents(&out.join("runs")), "nothing may change");
     }
+}
+
+#[test]
+fn finished_runs_of_other_settings_are_replaced_by_force_only() {
+    let (folder, path) = study();
+    let out = folder.path().join("out");
+    let run = |viscosity: &str, end: &str, more: &[&str]| {
+        let mut command = grainwake();
+        command.arg("study").arg(&path).arg("-o").arg(&out).args(["--quiet", "--set", end]);
+        command.args(["--set", &format!("fluid.viscosity={viscosity}")]).args(more).assert()
+    };
+    let (only_light, end) = (&["--only", "light"], "time.end=4 ms");
+    run("1 mPa s", end, only_light).success();
+    let before = crate::common::contents(&out);
+    let refused = run("2 mPa s", end, &[]).code(2);
+    refused.stderr(
+        contains("1 finished run that would be replaced: light (its case has changed)")
+            .and(contains("another folder with -o, or use --force")),
+    );
+    run("1 mPa s", "time.end=5 ms", &[]).code(2).stderr(contains("light (its "));
+    assert!(before == crate::common::contents(&out), "a refusal changes nothing");
+    // A run that is not chosen is not replaced.
+    run("2 mPa s", end, &["--only", "heavy"]).success();
+    run("2 mPa s", end, &["--force"]).success();
+    let case = std::fs::read_to_string(out.join("runs/light/case.resolved.toml")).unwrap();
+    assert!(case.contains("viscosity = 0.000002"), "{case}");
 }
 
 #[test]

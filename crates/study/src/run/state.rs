@@ -112,14 +112,13 @@ pub fn run_state(run: &Run, study: &Path, archive: &Archive) -> RunState {
     }
 }
 
-/// Returns the chosen runs whose folders hold a finished run of another case or end, each with the
-/// reason. [`execute`](crate::execute) replaces them. Runs that differ by the program alone are not
-/// listed: their repetition gives the results of the present program.
-pub fn replaced<'a>(
-    runs: &'a [Run],
-    chosen: &[usize],
-    study: &Path,
-) -> Vec<(&'a Run, &'static str)> {
+/// Refuses a study folder in which [`execute`](crate::execute) would replace finished runs of other
+/// cases or ends. Runs that differ by the program alone may be replaced: their repetition gives the
+/// results of the present program.
+///
+/// # Errors
+/// [`StudyError::WouldReplace`] with the runs.
+pub fn refuse_to_replace(runs: &[Run], chosen: &[usize], study: &Path) -> Result<(), StudyError> {
     let differs = |run: &Run| {
         let folder = run.folder(study);
         let found = Provenance::read(&folder).filter(|_| folder.join(summary::FILE).is_file())?;
@@ -129,7 +128,11 @@ pub fn replaced<'a>(
         // A damaged file is a failure of the run, which replaces nothing.
         ending_in(&folder).ok().filter(|ending| *ending != run.ending).map(|_| OTHER_END)
     };
-    chosen.iter().filter_map(|n| differs(&runs[*n]).map(|why| (&runs[*n], why))).collect()
+    let named = |n: &usize| differs(&runs[*n]).map(|why| (runs[*n].name.clone(), why));
+    match chosen.iter().filter_map(named).collect::<Vec<_>>() {
+        found if found.is_empty() => Ok(()),
+        found => Err(StudyError::WouldReplace { folder: study.into(), runs: found }),
+    }
 }
 
 /// Determines the state of a run by its run folder. The finished run of an accepted program counts.

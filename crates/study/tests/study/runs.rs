@@ -9,7 +9,7 @@ use crate::files::STUDY;
 use grainwake_run::{FailureKind, Progress};
 use grainwake_study::{
     Archive, Options, Outcome, Plan, RunRecord, RunState, StateKind, Study, StudyError,
-    StudyObserver, execute, records, render, replaced, run_state, to_csv, write_tables,
+    StudyObserver, execute, records, refuse_to_replace, render, run_state, to_csv, write_tables,
 };
 
 struct Quiet;
@@ -88,7 +88,11 @@ fn finished_runs_are_kept_and_stale_ones_repeated() {
     assert!(states(&longer, &study).iter().all(|s| matches!(s, RunState::Stale(_))));
     // Runs of another case or end count as results that are replaced, those of another program not.
     let all: Vec<usize> = (0..second.runs.len()).collect();
-    let replaced_by = |plan: &Plan| replaced(&plan.runs, &all, &study).len();
+    let replaced_by = |plan: &Plan| match refuse_to_replace(&plan.runs, &all, &study) {
+        Ok(()) => 0,
+        Err(StudyError::WouldReplace { runs, .. }) => runs.len(),
+        Err(error) => panic!("{error}"),
+    };
     assert_eq!((replaced_by(&first), replaced_by(&second), replaced_by(&longer)), (2, 0, 5));
     // Another version of the program.
     let file = study.join("runs/alone/provenance.json");
