@@ -39,7 +39,7 @@ impl Plan {
             Err(error @ StudyError::Damaged { .. }) => error,
             Err(error) => return Err(error),
         };
-        let runs = runs_in(folder)?;
+        let (runs, unreadable) = runs_in(folder)?;
         if runs.is_empty() {
             return Err(damage);
         }
@@ -50,8 +50,12 @@ impl Plan {
             Some(command) => format!("`{command}`"),
             None => "`grainwake study`".to_owned(),
         };
+        let lacks = match unreadable.as_slice() {
+            [] => String::new(),
+            names => format!(", and without {}, whose cases cannot be read", names.join(", ")),
+        };
         let note = format!(
-            "{damage}; its runs were found in the folder, without title, claims and runs that have not begun: {again} writes the file again and keeps finished runs"
+            "{damage}; its runs were found in the folder, without title, claims and runs that have not begun{lacks}: {again} writes the file again and keeps finished runs"
         );
         Ok((plan, Some(note)))
     }
@@ -67,20 +71,22 @@ impl Plan {
     }
 }
 
-/// Returns the runs with a folder or an entry in the table, by name.
-fn runs_in(folder: &Path) -> Result<Vec<Run>, StudyError> {
+/// Returns the runs with a folder or an entry in the table, by name, and the names of the folders
+/// whose cases cannot be read, without an entry.
+fn runs_in(folder: &Path) -> Result<(Vec<Run>, Vec<String>), StudyError> {
     let table: Vec<Entry> = read_rows(&folder.join(TABLE))?;
     let mut runs: BTreeMap<String, Run> = BTreeMap::new();
+    let mut unreadable = Vec::new();
     let folders = std::fs::read_dir(folder.join(RUNS)).into_iter().flatten().flatten();
     for path in folders.map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let resolved = path.join(RESOLVED);
-        let Some((provenance, case)) = Provenance::read(&path).zip(Case::load(&resolved, &[]).ok())
-        else {
-            continue;
-        };
+        let Some(provenance) = Provenance::read(&path) else { continue };
         let base = std::path::absolute(&resolved).unwrap_or(resolved);
-        let Ok(mut run) = run_of_case(&name, &base, Vec::new(), &case) else {
+        let case = Case::load(&base, &[]).ok();
+        let run = case.and_then(|case| run_of_case(&name, &base, Vec::new(), &case).ok());
+        let Some(mut run) = run else {
+            unreadable.push(name);
             continue;
         };
         // The hash of an earlier program may differ for the same case.
@@ -98,7 +104,9 @@ fn runs_in(folder: &Path) -> Result<Vec<Run>, StudyError> {
         (run.model, run.member, run.levels) = (model, member, levels);
         run.factors.extend(factors);
     }
-    Ok(runs.into_values().collect())
+    unreadable.retain(|name| !runs.contains_key(name));
+    unreadable.sort();
+    Ok((runs.into_values().collect(), unreadable))
 }
 
 /// Returns the command that started the runs, if their provenance names a study.

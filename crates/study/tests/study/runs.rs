@@ -549,6 +549,14 @@ fn a_damaged_plan_is_rebuilt_from_the_runs() {
     assert_eq!(rebuilt.runs.len(), 5);
     let found = records(&rebuilt, &study).unwrap();
     assert!(found.iter().all(|record| record.finished() && record.pair.is_some()));
+    // A run whose case cannot be read is named.
+    let case = study.join("runs/alone/case.resolved.toml");
+    let text = std::fs::read(&case).unwrap();
+    std::fs::write(&case, "title = ").unwrap();
+    let (rebuilt, note) = Plan::read_or_rebuild(&study).unwrap();
+    assert_eq!(rebuilt.runs.len(), 4);
+    assert!(note.unwrap().contains("without alone, whose cases cannot be read"));
+    std::fs::write(&case, text).unwrap();
     // The study goes on as if nothing had happened, also without the file.
     for damage in [true, false] {
         if damage {
