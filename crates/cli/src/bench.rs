@@ -47,12 +47,12 @@ pub fn bench(args: &BenchArgs) -> Result<(), Exit> {
     let sizes = if args.scaling { CUBES.map(|n| [n; 3]).to_vec() } else { vec![[nx, ny, nz]] };
     let measured: Vec<Measured> = threads::on(threads, || {
         if let Some(case) = own {
-            admit_memory(&case.setup)?;
+            admit_memory(&case.setup, None)?;
             return Ok(vec![measure::measure(case.setup, args, threads)?]);
         }
         let setup = |cells| {
             let setup = case::setup(cells, args.grains, scheme, args.precision)?;
-            admit_memory(&setup)?;
+            admit_memory(&setup, None)?;
             Ok(setup)
         };
         // No size is measured in vain.

@@ -22,7 +22,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Exit> {
     } else {
         print(&table(&case, &estimate, threads))?;
     }
-    admit_memory(&case.setup).map_err(Exit::from)
+    admit_memory(&case.setup, Some(&case.plan)).map_err(Exit::from)
 }
 
 /// Returns one line per warning.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use grainwake_formats::summary::Summary;
 use grainwake_run::case::{Case, Problem, Verdict, find_parent};
@@ -53,7 +55,11 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
         check::warnings(&case.estimate(threads)).for_each(|w| tell!("{w}"));
     }
     let job = case.job_in(&out, existing)?;
-    match progress::run(job, &out, &options, args.quiet, stop)?? {
+    let ending = progress::run(job, &out, &options, args.quiet, stop.clone())??;
+    if !matches!(ending, Ending::Interrupted(_)) {
+        signals::results_are_complete();
+    }
+    match ending {
         Ending::Interrupted(time) => {
             let message =
                 format!("interrupted at t = {}; a checkpoint was written", quantity(time, "s"));
@@ -72,13 +78,13 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
                 tell!("the run has already finished");
             }
             if !args.no_report && !out.join("report.html").exists() {
-                draw(args, &out);
+                draw(args, &out, &stop);
             }
             conclude(args, &case, &summary, &out)
         }
         Ending::Finished(summary) => {
             if !args.no_report {
-                draw(args, &out);
+                draw(args, &out, &stop);
             } else if !args.quiet && out.join("report.html").exists() {
                 tell!(
                     "note: report.html shows an earlier state of the run; draw it again with \
@@ -91,15 +97,36 @@ pub fn run(args: &RunArgs) -> Result<(), Exit> {
     }
 }
 
-/// Writes the report. The run is valid without it, so an error is only noted.
-fn draw(args: &RunArgs, out: &Path) {
-    match grainwake_report::render(out) {
-        Ok(done) if !args.quiet => tell!("report: {}", done.page.display()),
-        Ok(_) => {}
-        Err(error) => tell!(
-            "note: the report could not be drawn: {error}; retry with `grainwake report {}`",
-            out.display()
-        ),
+/// Writes the report, unless or until an interrupt sets `stop`. The run is valid without it, so
+/// an error is only noted.
+fn draw(args: &RunArgs, out: &Path, stop: &AtomicBool) {
+    let again = format!("`grainwake report {}`", shell_word(out));
+    let (sender, drawn) = mpsc::channel();
+    let folder = out.to_owned();
+    // After an interrupt the thread ends with the program.
+    std::thread::spawn(move || sender.send(grainwake_report::render(&folder)));
+    loop {
+        if stop.load(Ordering::Relaxed) {
+            tell!("interrupted: the run is complete, its report is not; draw it with {again}");
+            return;
+        }
+        match drawn.recv_timeout(Duration::from_millis(50)) {
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                tell!("note: the report could not be drawn: internal error of the program");
+                return;
+            }
+            Ok(Ok(done)) => {
+                if !args.quiet {
+                    tell!("report: {}", done.page.display());
+                }
+                return;
+            }
+            Ok(Err(error)) => {
+                tell!("note: the report could not be drawn: {error}; retry with {again}");
+                return;
+            }
+        }
     }
 }
 

@@ -70,6 +70,9 @@ pub fn study(args: &StudyArgs) -> Result<(), Exit> {
     let plan = Plan::resolve(&study, &args.overrides.list())?.accepting(&args.accept)?;
     let runs = &plan.runs;
     let chosen = selection.choose(runs)?;
+    if let Some(note) = plan.note_on_equal_runs() {
+        tell!("note: {note}");
+    }
     let folder =
         args.output.clone().unwrap_or_else(|| kind::default_folder(&args.study, "study", |_| true));
     let jobs = args.jobs.clamp(1, chosen.len().max(1));

@@ -93,6 +93,7 @@ impl PyStudy {
         let set = override_list(overrides, None)?;
         let read = |stop: &_| Plan::resolve_until(&Study::read(&path)?, &set, stop);
         let plan = running::interruptible(py, read)?.raise()?;
+        warn(py, plan.note_on_equal_runs())?;
         Ok(PyStudy { plan })
     }
 

@@ -52,7 +52,7 @@ pub enum RunError {
         folder: PathBuf,
     },
     /// The run needs more memory than is free.
-    #[error("the run needs {} of memory and {} are free; take larger cells, a smaller box, fewer surface nodes or [run] precision = \"f32\"", size(*needed), size(*free))]
+    #[error("the run needs {} of memory and {} are free; take larger cells, a smaller box, fewer surface nodes, no surfaces in VTK files (output.surfaces = 0) or [run] precision = \"f32\"", size(*needed), size(*free))]
     Memory {
         /// Memory of the run [bytes].
         needed: u64,

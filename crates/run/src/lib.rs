@@ -4,9 +4,9 @@
 //! simulation and fills a folder with tables, VTK files, checkpoints and a summary.
 //! `docs/reference/run-folder.md` lists the files.
 //!
-//! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder` -> `run_folder`,
-//! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `memory`, `meter`,
-//! `queue`, `threads`, `plan`, `error`, `grain_size` -> `number_format`.
+//! Layers, downwards: `case` -> `run_loop` -> `recording` -> `recorder`, `memory` -> `run_folder`,
+//! `contact_events`, `series`, `watch` -> `overlaps`, `contact_work`, `meter`, `queue`, `threads`,
+//! `plan`, `error`, `grain_size` -> `number_format`.
 
 pub mod case;
 mod contact_events;

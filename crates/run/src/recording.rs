@@ -229,7 +229,7 @@ impl Recording {
         options: &Options,
         note: &mut dyn FnMut(&str),
     ) -> Result<(Simulation, Recording), RunError> {
-        crate::memory::admit_memory(&job.setup)?;
+        crate::memory::admit_memory(&job.setup, Some(&job.plan))?;
         let opened = Opened::new(job, out, options)?;
         if opened.finished(job, note)?.is_some() {
             let remedy = "give another folder or a later end, or replace it (force)";

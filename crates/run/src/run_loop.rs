@@ -80,7 +80,7 @@ pub fn run(
     observer: &mut dyn Observer,
 ) -> Result<Ending, RunError> {
     let job = &job;
-    memory::admit_memory(&job.setup)?;
+    memory::admit_memory(&job.setup, Some(&job.plan))?;
     let opened = Opened::new(job, out, options)?;
     if let Some(summary) = opened.finished(job, &mut |text| observer.note(text))? {
         return Ok(Ending::AlreadyFinished(summary));

@@ -1,5 +1,5 @@
 //! Memory that the program may take: that which is free, and what is left of the limits of its
-//! control groups, by which containers and batch systems bound a job.
+//! control groups and of the process, by which containers and batch systems bound a job.
 
 use std::fs::read_to_string;
 use std::path::Path;
@@ -10,7 +10,24 @@ pub fn available_memory() -> Option<u64> {
     let text = |path: &str| read_to_string(path).unwrap_or_default();
     let free = mem_available(&text("/proc/meminfo"));
     let left = left_in_groups(&text("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
-    free.into_iter().chain(left).min()
+    let in_process = left_in_process(&text("/proc/self/limits"), &text("/proc/self/status"));
+    [free, left, in_process].into_iter().flatten().min()
+}
+
+/// Limits of a process (`ulimit -v`, `ulimit -d`), and their use in /proc/self/status.
+const OF_PROCESS: [[&str; 2]; 2] = [["Max address space", "VmSize:"], ["Max data size", "VmData:"]];
+
+/// Returns the least memory that is left [bytes] of the limits of the process, from the texts of
+/// /proc/self/limits and /proc/self/status.
+fn left_in_process(limits: &str, status: &str) -> Option<u64> {
+    let left = |[limit, used]: [&str; 2]| {
+        let mut soft = limits.lines().find_map(|line| line.strip_prefix(limit))?.split_whitespace();
+        let soft: u64 = soft.next()?.parse().ok()?;
+        let used = status.lines().find_map(|line| line.strip_prefix(used))?;
+        let kib: u64 = used.trim().strip_suffix("kB")?.trim().parse().ok()?;
+        Some(soft.saturating_sub(kib * 1024))
+    };
+    OF_PROCESS.into_iter().filter_map(left).min()
 }
 
 /// Parses the available memory [bytes] from the text of /proc/meminfo.
@@ -66,6 +83,25 @@ mod tests {
         assert_eq!(mem_available(text), Some(4_096_000_000));
         assert_eq!(mem_available("MemTotal: 24000000 kB\n"), None);
         assert_eq!(mem_available("MemAvailable: many kB\n"), None);
+    }
+
+    #[test]
+    fn limits_of_the_process_count() {
+        let status = "VmPeak:\t  9000 kB\nVmSize:\t    1000 kB\nVmData:\t     200 kB\n";
+        let limits = |space: &str, data: &str| {
+            format!(
+                "Limit                     Soft Limit           Hard Limit           Units\n\
+                 Max data size             {data}            unlimited            bytes\n\
+                 Max address space         {space}            unlimited            bytes\n"
+            )
+        };
+        let left = |space, data| left_in_process(&limits(space, data), status);
+        assert_eq!(left("unlimited", "unlimited"), None);
+        assert_eq!(left("2048000", "unlimited"), Some(1_024_000));
+        assert_eq!(left("2048000", "1228800"), Some(1_024_000));
+        assert_eq!(left("2048000", "1024000"), Some(819_200));
+        assert_eq!(left("4096", "unlimited"), Some(0));
+        assert_eq!(left_in_process("", ""), None);
     }
 
     #[test]

@@ -142,6 +142,12 @@ fn an_interrupted_branch_resumes_to_the_same_bits() {
     run(&case, &parted, &[&job[..], &["--set", "time.end=40 ms"]].concat()).success();
     run(&case, &parted, &job).success();
     assert_same_run(&whole, &parted);
+    // A job that names an earlier checkpoint of the same parent asks for another run.
+    let mut earlier = job;
+    let from = self::from(&parent, "10 ms");
+    earlier[1] = &from;
+    let refused = message(&run(&case, &parted, &earlier).code(2));
+    assert!(refused.contains("it started at t = 14 ms"), "{refused}");
     // Another parent is refused, and so is a start at t = 0.
     let other = folder.path().join("other");
     run(&case, &other, &["--set", "grain.0.density=2000", "--set", "time.end=10 ms"]).success();

@@ -22,6 +22,7 @@ mod poses;
 mod probes;
 mod resume;
 mod scan;
+mod signals;
 mod study;
 mod validate;
 mod view;

@@ -135,6 +135,7 @@ fn unset_removes_a_key_so_that_its_default_applies() {
         .code(2)
         .stderr(contains("--unset time.speed: the case has no such key"))
         .stderr(contains("present are end, step"));
+    check(&["--unset", "time.step=1"]).code(2).stderr(contains("a value follows the key"));
     check(&["--unset", "grain.0"]).code(2).stderr(contains("a row of a list, not a key"));
     check(&["--unset", "grain.7.density"]).code(2).stderr(contains("grain.0, grain.1, grain.2"));
     let bench = |more: &[&str]| {

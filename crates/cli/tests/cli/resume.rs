@@ -2,6 +2,8 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;
+#[cfg(unix)]
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -238,11 +240,22 @@ fn a_checkpoint_ahead_of_the_tables_gives_way_to_the_one_before() {
         let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).success();
         let message = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
         assert!(
-            message.contains(&format!("the tables end before it: {table} has"))
+            message.contains(&format!("the tables do not reach it: {table} has"))
                 && message.contains("checkpoint before it"),
             "{message}"
         );
         assert_same_run(&whole, &out);
+        std::fs::remove_dir_all(out).unwrap();
+    }
+    // Other ends of lines, as a spreadsheet writes them, shift all rows.
+    for table in ["grains.csv", "diagnostics.csv"] {
+        let out = unfinished(folder.path(), &case);
+        let text = std::fs::read_to_string(out.join(table)).unwrap();
+        std::fs::write(out.join(table), text.replace('\n', "\r\n")).unwrap();
+        let before = crate::common::contents(&out);
+        let done = run(&case, &out, &["--set", "time.end=30 ms", "--resume"]).code(4);
+        done.stderr(predicates::str::contains(format!("{table} was changed")));
+        assert_eq!(before, crate::common::contents(&out), "nothing may change");
         std::fs::remove_dir_all(out).unwrap();
     }
     // Without any rows there is nothing to continue.
@@ -495,6 +508,19 @@ fn interrupted_by(signal: &str) {
     let long = ["--set", "output.checkpoint_steps=0", "--set", "time.end=100 s"];
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("grainwake"));
     command.arg("run").arg(&case).arg("-o").arg(&out).arg("--quiet").args(long);
+    let number = match signal {
+        "-INT" => libc::SIGINT,
+        "-TERM" => libc::SIGTERM,
+        _ => libc::SIGHUP,
+    };
+    // Tests that run in the background or under `nohup` ignore some signals.
+    let heed = move || {
+        // SAFETY: `signal` may be called between `fork` and `exec`.
+        unsafe { libc::signal(number, libc::SIG_DFL) };
+        Ok(())
+    };
+    // SAFETY: `heed` only calls `signal`.
+    unsafe { command.pre_exec(heed) };
     let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     while !out.join("slices/y-grain0_000000.vti").is_file() {
         std::thread::sleep(Duration::from_millis(1));

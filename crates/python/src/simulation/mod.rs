@@ -195,7 +195,7 @@ impl PySimulation {
             }
             None => {
                 let setup = given.setup.clone();
-                admit_memory(&setup).raise()?;
+                admit_memory(&setup, None).raise()?;
                 (py.detach(|| pool.install(|| Simulation::new(setup))).raise()?, None)
             }
         };

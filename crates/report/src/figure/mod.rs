@@ -1,6 +1,7 @@
 //! Figures of a run.
 
 mod arrows;
+mod coverage;
 mod curves;
 pub mod field;
 pub mod grain_surface;

@@ -7,6 +7,7 @@ use grainwake_plot::drawing::Drawing;
 use grainwake_plot::equal_aspect::{EqualAspectFrame, Window, colour_bar, length_unit};
 use grainwake_plot::style::PAGE;
 
+use super::coverage::Coverage;
 use super::grain_surface::Outline;
 use super::scene::{AXES, Scene};
 use crate::features::{length, short};
@@ -17,6 +18,9 @@ const LEFT: f64 = 38.0;
 const MIDDLE: f64 = 44.0;
 /// Top margin [pt].
 const TOP: f64 = 8.0;
+
+/// Edge of the cells on paper by which hidden grains are found [pt].
+const CELL: f64 = 0.5;
 
 /// Returns the style of a grain with this position on the colour scale, 0 to 1.
 pub(crate) fn grain_style(position: f64) -> String {
@@ -110,18 +114,30 @@ pub fn figure(scene: &Scene) -> Option<Figure> {
         let mut order = grains.clone();
         order.sort_by(|a, b| nearness(a).total_cmp(&nearness(b)).then(a.cmp(b)));
         frame.clip(&mut drawing, &format!("clip-{i}"));
-        for grain in order {
-            let height = place(grain)[up];
-            let style = grain_style((height - low) / (high - low).max(1e-12));
+        // From the nearest one: grains behind others are left out.
+        let mut coverage = Coverage::new(window, CELL / scale);
+        let mut seen: Vec<(String, String)> = Vec::new();
+        for grain in order.into_iter().rev() {
+            let (centre, reach) = (place(grain), scene.reach(grain));
+            let hidden =
+                |(dx, dy): &(f64, f64)| coverage.hides((centre[h] + dx, centre[v] + dy), reach);
+            let shifts = scene.image_shifts(h, v);
+            let shifts: Vec<(f64, f64)> = shifts.into_iter().filter(|s| !hidden(s)).collect();
+            if shifts.is_empty() {
+                continue;
+            }
+            let style = grain_style((centre[up] - low) / (high - low).max(1e-12));
             let outlines = scene.outlines(grain, last(grain), h, v);
-            for (dx, dy) in scene.image_shifts(h, v) {
+            for (dx, dy) in shifts {
                 let shifted = |ring: &Outline| ring.iter().map(|p| (p.0 + dx, p.1 + dy)).collect();
                 let image: Vec<Outline> = outlines.iter().map(shifted).collect();
                 if image.iter().any(|ring| is_seen(ring, window)) {
-                    drawing.path(&frame.paths(&image), &style);
+                    seen.push((frame.paths(&image), style.clone()));
+                    coverage.add(&image);
                 }
             }
         }
+        seen.iter().rev().for_each(|(path, style)| drawing.path(path, style));
         drawing.end_clip();
         let names = [h, v].map(|axis| format!("*{}*  [{unit}]", AXES[axis]));
         let below = (tall || i == 1).then_some(names[0].as_str());

@@ -147,6 +147,9 @@ impl Scene<'_> {
     pub fn outlines(&self, grain: usize, row: usize, across: usize, up: usize) -> Vec<Outline> {
         let history = &self.run.grains[grain];
         let position = self.run.wrapped(history.position[row]);
+        if let Some(diameter) = self.sphere_diameter(grain) {
+            return vec![grain_surface::circle((position[across], position[up]), 0.5 * diameter)];
+        }
         let body = self.surfaces.get(&grain);
         let traced = body.map(|body| body.outlines(position, history.orientation[row], across, up));
         traced.filter(|outlines| !outlines.is_empty()).unwrap_or_else(|| {
@@ -154,6 +157,16 @@ impl Scene<'_> {
             let diameter = own.or(self.run.facts.diameter()).unwrap_or(0.0);
             vec![grain_surface::circle((position[across], position[up]), 0.5 * diameter)]
         })
+    }
+
+    /// Returns a radius around the position of a grain that holds its outlines [m].
+    pub fn reach(&self, grain: usize) -> f64 {
+        let facts = &self.run.facts;
+        let own = facts.grains.get(grain).and_then(|facts| facts.diameter);
+        let sphere = 0.5 * own.or(facts.diameter()).unwrap_or(0.0);
+        let surface = self.surfaces.get(&grain).filter(|_| self.sphere_diameter(grain).is_none());
+        let farthest = surface.map(|body| body.points().iter().map(|p| p.length()));
+        farthest.map_or(sphere, |lengths| lengths.fold(sphere, f64::max))
     }
 
     /// Returns the shifts of an outline to itself and to its images through periodic faces, along

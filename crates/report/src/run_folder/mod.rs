@@ -173,6 +173,13 @@ impl RunFolder {
         let last = self.grains.iter().filter_map(|history| history.time.last().copied());
         let of_grains = known.then(|| last.reduce(f64::max));
         let tables = [("grains.csv", of_grains), ("diagnostics.csv", of_diagnostics)];
+        let listed = self.summary.as_ref().and_then(|summary| summary.get("events")?.as_array());
+        let lost = listed.map_or(0, |listed| listed.len().saturating_sub(self.events.len()));
+        let events = match lost {
+            0 => None,
+            1 => Some(format!("{} lacks an event of summary.json", events::FILE)),
+            lost => Some(format!("{} lacks {lost} events of summary.json", events::FILE)),
+        };
         let short = tables.into_iter().filter_map(|(name, last)| match last? {
             None => Some(format!("{name} has no rows: the file is damaged")),
             Some(last) if last < end * (1.0 - 1e-9) => {
@@ -180,7 +187,7 @@ impl RunFolder {
             }
             Some(_) => None,
         });
-        short.collect()
+        short.chain(events).collect()
     }
 
     /// Returns whether the run reached its end.

@@ -148,7 +148,7 @@ impl Estimate {
             expected_end_s,
             steps: steps as u64,
             time_step_s,
-            memory_bytes: memory::needed(setup),
+            memory_bytes: memory::needed(setup, Some(plan)),
             memory_free_bytes: available_memory(),
             disk_bytes: output_bytes(setup, plan, expected_end_s, grain_files) as u64,
             checkpoint_bytes: checkpoint_bytes(setup, plan) as u64,

@@ -97,8 +97,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads a case file and applies overrides: "time.end=0.5" sets a key, "-time.step" removes
-    /// one.
+    /// Reads a case file and applies overrides in turn: "time.end=0.5" sets a key, "-time.step"
+    /// removes one.
     ///
     /// # Errors
     /// [`CaseError`] with every problem found and its place.
@@ -169,7 +169,7 @@ impl Case {
     /// Reads the case of an origin.
     fn build(origin: Origin, library: Library, stop: &AtomicBool) -> Result<Case, CaseError> {
         let Origin { name, text, overrides, .. } = &origin;
-        let (source, raw) = source::Source::parse_in_turn(name, text, overrides)?;
+        let (source, raw) = source::Source::parse(name, text, overrides)?;
         let validated = validate::validate(&source, raw, library, stop)?;
         Case::of(origin, source, validated)
     }

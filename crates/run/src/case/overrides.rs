@@ -71,6 +71,10 @@ pub(super) fn override_table<'i>(
 
 /// Removes a key such as "time.step" or "grain.0.velocity" from a table.
 pub(super) fn remove_key(table: &mut DeTable, key: &str) -> Result<(), Problem> {
+    if let Some((key, _)) = key.split_once('=') {
+        let help = "--unset takes a key alone, and no key begins with `-`";
+        return Err(Problem::new(format!("--unset {key}: a value follows the key")).help(help));
+    }
     let absent = |known: Vec<String>| {
         let help = match known.is_empty() {
             true => "there are no keys at this place".to_owned(),

@@ -59,7 +59,7 @@ const SINGLE: [&str; 7] = ["domain", "fluid", "coupling", "contact", "time", "ou
 
 impl Source {
     /// Reads the text of a file called `name` and applies overrides: `-time.step` removes a key,
-    /// `time.end=0.5` sets one. Keys are removed first.
+    /// `time.end=0.5` sets one. Each applies to the result of those before it.
     ///
     /// # Errors
     /// The first problem, with its position.
@@ -67,16 +67,6 @@ impl Source {
         name: &str,
         text: &str,
         overrides: &[String],
-    ) -> Result<(Source, T), Problem> {
-        Source::parse_in_turn(name, text, &[overrides])
-    }
-
-    /// Reads a text like [`Source::parse`] with several lists of overrides: each applies to the
-    /// result of the one before.
-    pub(super) fn parse_in_turn<T: DeserializeOwned>(
-        name: &str,
-        text: &str,
-        lists: &[impl AsRef<[String]>],
     ) -> Result<(Source, T), Problem> {
         admit(name, text)?;
         let mut source = Source {
@@ -86,9 +76,7 @@ impl Source {
             entries: Vec::new(),
         };
         let mut start = text.len() + 1;
-        let removes = |item: &&String| item.starts_with('-');
-        let all = lists.iter().flat_map(AsRef::as_ref);
-        for item in all.filter(|item| !removes(item)) {
+        for item in overrides.iter().filter(|item| !item.starts_with('-')) {
             let line = override_line(item)?;
             let length = line.len() + 1;
             source.overrides.push(Override { start, line });
@@ -100,20 +88,17 @@ impl Source {
         let padded: Vec<String> =
             source.overrides.iter().map(|o| format!("{}{}", " ".repeat(o.start), o.line)).collect();
         let mut padded = padded.iter();
-        for list in lists {
-            let (removed, set): (Vec<&String>, Vec<&String>) =
-                list.as_ref().iter().partition(removes);
-            for key in removed {
-                remove_key(table.get_mut(), &key[1..])?;
+        for line in overrides {
+            if let Some(key) = line.strip_prefix('-') {
+                remove_key(table.get_mut(), key)?;
+                continue;
             }
-            for (line, item) in set.into_iter().zip(&mut padded) {
-                let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
-                let key = line.split_once('=').map_or(line.as_str(), |(key, _)| key).trim();
-                let parts = key.split('.').count();
-                override_table(table.get_mut(), extra.into_inner(), parts).map_err(|m| {
-                    Problem::new(m).key(key).at("--set", line, 0..key.len(), "here")
-                })?;
-            }
+            let Some(item) = padded.next() else { break };
+            let extra = DeTable::parse(item).map_err(|e| source.located(&e))?;
+            let key = line.split_once('=').map_or(line.as_str(), |(key, _)| key).trim();
+            let parts = key.split('.').count();
+            override_table(table.get_mut(), extra.into_inner(), parts)
+                .map_err(|m| Problem::new(m).key(key).at("--set", line, 0..key.len(), "here"))?;
         }
         collect_keys(table.get_ref(), "", text, &mut source.entries);
         let value = T::deserialize(Deserializer::from(table)).map_err(|e| source.located(&e))?;

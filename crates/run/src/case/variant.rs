@@ -17,8 +17,8 @@ pub struct Origin {
     /// Name of the text in messages.
     pub(super) name: String,
     pub(super) text: String,
-    /// Overrides of the text; each list applies to the result of the one before.
-    pub(super) overrides: Vec<Vec<String>>,
+    /// Overrides of the text; each applies to the result of those before.
+    pub(super) overrides: Vec<String>,
     /// Folder that files are relative to.
     folder: PathBuf,
     /// Path of each grain file, and its name in the run folder.
@@ -31,7 +31,7 @@ impl Origin {
         Origin {
             name: name.into(),
             text: text.into(),
-            overrides: vec![overrides.to_vec()],
+            overrides: overrides.to_vec(),
             folder: folder.into(),
             files: Vec::new(),
         }
@@ -72,7 +72,7 @@ impl Case {
         stop: &AtomicBool,
     ) -> Result<Case, CaseError> {
         let mut origin = self.origin.clone();
-        origin.overrides.push(overrides.to_vec());
+        origin.overrides.extend_from_slice(overrides);
         let contents: BTreeMap<&str, &Arc<Vec<u8>>> =
             self.shapes.iter().map(|(name, bytes)| (name.as_str(), bytes)).collect();
         let known = |(path, name): &(PathBuf, String)| {

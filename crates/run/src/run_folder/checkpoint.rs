@@ -231,7 +231,7 @@ fn read_own(
 ) -> Result<Record, String> {
     let (record, _) = open(path)?;
     if let Some(lacking) = record.lengths.lacking(run, extra) {
-        return Err(format!("the tables end before it: {lacking}"));
+        return Err(format!("the tables do not reach it: {lacking}"));
     }
     read(path, digest, sim)
 }

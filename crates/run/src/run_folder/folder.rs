@@ -151,7 +151,16 @@ pub(crate) fn same_parent(
             let what = format!("it started {there}, and --from names {here}");
             Err(RunError::OtherCase { folder: folder.into(), what })
         }
-        _ => Ok(()),
+        Some(parent) => match recorded {
+            Some(own) if !parent.may_be_at(own.checkpoint_time) => {
+                let (own, asked) = (own.checkpoint_time, parent.time());
+                let [own, asked] = [own, asked].map(|time| quantity(time, "s"));
+                let what = format!("it started at t = {own}, and --from names t = {asked}");
+                Err(RunError::OtherCase { folder: folder.into(), what })
+            }
+            _ => Ok(()),
+        },
+        None => Ok(()),
     }
 }
 

@@ -24,6 +24,6 @@ pub(crate) use folder::{
     Content, admit, admit_parent, clear, create, lock_folder, remove_if_there, same_parent,
     start_lost,
 };
-pub(crate) use size::{checkpoint_bytes, output_bytes};
+pub(crate) use size::{checkpoint_bytes, output_bytes, surface_bytes};
 pub(crate) use tables::Tables;
 pub(crate) use vtk_output::{VtkOutput, contact_files};

@@ -16,9 +16,17 @@ pub struct Parent {
     checkpoint: PathBuf,
     time: f64,
     steps: u64,
+    /// Latest time of the checkpoint that was asked for [s].
+    at: Option<f64>,
 }
 
 impl Parent {
+    /// Returns whether a run that started from the checkpoint at `time` [s] can be one from this
+    /// parent: not after the time that was asked for.
+    pub(crate) fn may_be_at(&self, time: f64) -> bool {
+        self.at.is_none_or(|at| time <= at * (1.0 + SAME_TIME))
+    }
+
     /// Finds the newest checkpoint in the run folder `folder` at or before the time `at` [s], or
     /// the newest one of all. `note` receives the faults of newer ones.
     ///
@@ -55,7 +63,7 @@ impl Parent {
                     }
                     let (time, steps) = (record.time, record.steps);
                     let folder = folder.to_path_buf();
-                    return Ok(Parent { folder, provenance, checkpoint: path, time, steps });
+                    return Ok(Parent { folder, provenance, checkpoint: path, time, steps, at });
                 }
                 Err(fault) => faults.push(format!("{}: {fault}", path.display())),
             }

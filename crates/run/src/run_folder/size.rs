@@ -84,7 +84,7 @@ pub fn checkpoint_bytes(setup: &Setup, plan: &RunPlan) -> f64 {
 }
 
 /// Returns the size of a file of the surfaces of all grains.
-fn surface_bytes(setup: &Setup) -> f64 {
+pub(crate) fn surface_bytes(setup: &Setup) -> f64 {
     let count = setup.grains.len();
     let points = |shape: &Shape| {
         let squares = |edge: f64| shape.surface_area() / edge.powi(2);

@@ -2,7 +2,7 @@
 //! asks for. Rows are appended, and cut back to the checkpoint when a run is resumed.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::diagnostics::{self, DiagnosticsRow};
@@ -27,12 +27,17 @@ pub const FILES: [&str; 3] = [grains::FILE, diagnostics::FILE, events::FILE];
 pub struct Lengths(Vec<u64>);
 
 impl Lengths {
-    /// Returns what the growing files in a run folder lack to be at least this long; none if they
-    /// are.
+    /// Returns what the growing files in a run folder lack to have a row that ends at this length;
+    /// none if they have.
     pub(super) fn lacking(&self, run: &Path, extra: &[ExtraTable]) -> Option<String> {
         names(extra).zip(&self.0).find_map(|(name, length)| {
-            match std::fs::metadata(run.join(&name)).map(|data| data.len()) {
-                Ok(found) if found >= *length => None,
+            let file = run.join(&name);
+            match std::fs::metadata(&file).map(|data| data.len()) {
+                Ok(found) if found >= *length => match row_ends_at(&file, *length) {
+                    Ok(true) => None,
+                    Ok(false) => Some(format!("{name} was changed: no row ends at byte {length}")),
+                    Err(error) => Some(format!("{name} cannot be read: {error}")),
+                },
                 Ok(found) => Some(format!("{name} has {found} bytes, and then it had {length}")),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {
                     Some(format!("{name} is missing"))
@@ -41,6 +46,16 @@ impl Lengths {
             }
         })
     }
+}
+
+/// Returns whether the byte before `length` ends a row.
+fn row_ends_at(file: &Path, length: u64) -> io::Result<bool> {
+    let Some(last) = length.checked_sub(1) else { return Ok(true) };
+    let mut file = File::open(file)?;
+    file.seek(SeekFrom::Start(last))?;
+    let mut byte = [0];
+    file.read_exact(&mut byte)?;
+    Ok(byte == *b"\n")
 }
 
 /// Returns the names of the growing files, the extra tables last.

@@ -14,6 +14,9 @@ use super::{Factors, Levels};
 /// Largest number of runs of a study.
 pub(crate) const MOST_RUNS: usize = 100_000;
 
+/// Largest number of characters of the name of a model; members have a suffix.
+const LONGEST_NAME: usize = 200;
+
 /// Override of one case key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
@@ -243,8 +246,15 @@ impl Problems<'_> {
     }
 
     fn check_unique(&mut self, raw: &RawStudy, models: &[Model]) {
+        if let Some(long) = models.iter().find(|model| model.name.len() > LONGEST_NAME) {
+            let message = format!("the name of a model has {} characters", long.name.len());
+            let help = format!("names become folders: at most {LONGEST_NAME} characters");
+            self.add(message, &help, None, "");
+        }
+        // Names that differ by case alone share a folder on some disks.
         let mut seen = BTreeSet::new();
-        let Some(model) = models.iter().find(|model| !seen.insert(&model.name)) else {
+        let Some(model) = models.iter().find(|model| !seen.insert(model.name.to_lowercase()))
+        else {
             return;
         };
         let own = raw.model.iter().map(|own| &own.name).rfind(|name| name.value == model.name);
@@ -255,7 +265,8 @@ impl Problems<'_> {
         });
         let name = own.or(level);
         let message = format!("there are two models called \"{}\"", model.name);
-        let help = "give every value of an axis and every model a unique name";
+        let help = "give every value of an axis and every model a unique name, whatever the case of \
+                    its letters";
         self.add(message, help, name.and_then(|name| name.span.as_ref()), "again");
     }
 }

@@ -11,6 +11,7 @@ mod rebuild;
 mod resolve;
 pub mod selection;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use grainwake_formats::disk::{self, is_temporary};
@@ -145,6 +146,25 @@ pub struct Plan {
 const COMMIT_DIGITS: usize = 12;
 
 impl Plan {
+    /// Returns a note if runs of different names are the same case with the same end: a setting,
+    /// such as a level of an axis, has no effect in them.
+    pub fn note_on_equal_runs(&self) -> Option<String> {
+        let mut first: BTreeMap<&str, &str> = BTreeMap::new();
+        let mut pairs: Vec<[&str; 2]> = Vec::new();
+        for run in &self.runs {
+            pairs.extend(first.insert(&run.id, &run.name).map(|earlier| [earlier, &run.name]));
+        }
+        let [one, other] = pairs.first()?;
+        let more = match pairs.len() - 1 {
+            0 => String::new(),
+            more => format!(", and so are {more} more"),
+        };
+        Some(format!(
+            "{other} is the same case as {one}{more}: what distinguishes them has no effect, or an \
+             override replaces it"
+        ))
+    }
+
     /// Returns the plan of this program with these runs.
     fn new(study: PathBuf, title: String, analysis: Analysis, runs: Vec<Run>) -> Plan {
         let Provenance { version, commit, .. } = Provenance::new("");

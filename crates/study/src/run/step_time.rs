@@ -45,7 +45,7 @@ pub fn time_steps(run: &Run, jobs: usize, threads: usize) -> Result<StepTime, St
     // One after the other, since each reduces the free memory.
     let copy = |pool: &ThreadPool| {
         pool.install(|| {
-            admit_memory(&case.setup)?;
+            admit_memory(&case.setup, None)?;
             Ok(Simulation::new(case.setup.clone())?)
         })
     };

@@ -37,6 +37,33 @@ fn axes_multiply_and_models_follow() {
 }
 
 #[test]
+fn overrides_apply_after_all_settings_of_the_study() {
+    let unset = ["-time.end".to_owned(), "time.end=40 ms".to_owned()];
+    let (_folder, path) = folder(STUDY);
+    let runs = grainwake_study::Plan::resolve(&Study::read(&path).unwrap(), &unset).unwrap().runs;
+    assert!(runs.iter().all(|run| run.end_s == 0.04));
+    let unset = ["-time.step".to_owned(), "time.max_step=0.3 ms".to_owned()];
+    let set = STUDY.replace("\"time.end\" = \"50 ms\"", "\"time.step\" = \"0.05 ms\"");
+    let (_folder, path) = folder(&set);
+    let runs = grainwake_study::Plan::resolve(&Study::read(&path).unwrap(), &unset).unwrap().runs;
+    let heavy = runs[3].case().unwrap().resolved;
+    assert!(heavy.contains("max_step = 0.0003") && !heavy.contains("\nstep = "), "{heavy}");
+}
+
+#[test]
+fn runs_that_are_the_same_case_are_noted() {
+    let (_folder, path) = folder(STUDY);
+    let study = Study::read(&path).unwrap();
+    let note = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|s| (*s).to_string()).collect();
+        grainwake_study::Plan::resolve(&study, &sets).unwrap().note_on_equal_runs()
+    };
+    assert_eq!(note(&[]), None);
+    let equal = note(&["contact.friction=0.3", "contact.wall_friction=0.3"]).unwrap();
+    assert!(equal.starts_with("light-rough is the same case as light-smooth, and so are 1 more"));
+}
+
+#[test]
 fn a_model_may_replace_all_grains() {
     let text = STUDY.replace(
         "set = { \"grain.1.velocity\" = [0, 0, 0] }",
@@ -212,6 +239,11 @@ fn problems_are_located() {
     let (message, _, place) = one(&joined);
     assert!(message.contains("two models called \"light-rough-rough\""), "{message}");
     assert_eq!(place, Some((true, 15)));
+    let (message, help, _) = one(&STUDY.replace("\"alone\"", "\"Light-Rough\""));
+    assert!(message.contains("two models called \"Light-Rough\""), "{message}");
+    assert!(help.contains("whatever the case"), "{help}");
+    let (message, ..) = one(&STUDY.replace("\"alone\"", &format!("\"{}\"", "a".repeat(201))));
+    assert!(message.contains("has 201 characters"), "{message}");
     let (message, help, _) = one(&STUDY.replace("heavy-*", "haevy-rough"));
     assert!(
         message.contains("no model is called") && help.contains("heavy-rough"),

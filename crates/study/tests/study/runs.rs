@@ -309,6 +309,20 @@ fn a_finished_run_with_damaged_files_keeps_its_values() {
     }
     let page = std::fs::read_to_string(study.join("report.html")).unwrap();
     assert!(page.contains("grains.csv"), "the page names the damage");
+    // The times of the stages of a pair come from the events.
+    std::fs::write(&file, &text).unwrap();
+    let events = plan.runs[0].folder(&study).join("events.jsonl");
+    assert!(std::fs::read_to_string(&events).unwrap().lines().count() > 1);
+    for damage in ["lost", "empty"] {
+        match damage {
+            "lost" => std::fs::remove_file(&events).unwrap(),
+            _ => std::fs::write(&events, "").unwrap(),
+        }
+        let after = records(&plan, &study).unwrap();
+        let remark = after[0].remark.clone().unwrap();
+        assert!(remark.contains("events.jsonl lacks"), "{damage}: {remark}");
+        assert_eq!(after[0].pair, before[0].pair, "{damage}");
+    }
     assert_eq!(records(&plan, &study).unwrap()[0].pair, before[0].pair);
 }
 

@@ -16,6 +16,8 @@ const WARNED_OVERLAP: f64 = 0.05;
 const UNBALANCED: f64 = 3.0;
 /// Lubrication gap [cells] from which the force is too large, and its inverse too small.
 const ONE_CELL: f64 = 1.25;
+/// Least height of asperities without a warning [m].
+const LEAST_ROUGHNESS: f64 = 1e-10;
 /// Time over which the contact forces at the start act [s]; the grains hardly move.
 const MOMENT: f64 = 1e-12;
 
@@ -70,6 +72,18 @@ pub(super) fn film_off_the_grid(setup: &Setup) -> Option<String> {
         length(gap),
         length(cell)
     ))
+}
+
+/// Asperities of a lubrication film that are thinner than atoms, as of a forgotten unit.
+pub(super) fn tiny_asperities(setup: &Setup) -> Option<String> {
+    let roughness = setup.contact.roughness;
+    let tiny = setup.contact.lubrication_gap > 0.0 && roughness < LEAST_ROUGHNESS;
+    tiny.then(|| {
+        format!(
+            "a roughness of {} is less than the size of an atom, and contacts in the film need very short sub-steps: check its unit",
+            length(roughness)
+        )
+    })
 }
 
 /// Contacts at the start that do not carry the weight: the stiffness is not that of the run in

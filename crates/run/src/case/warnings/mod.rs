@@ -12,7 +12,8 @@ use crate::number_format::{AXES, SIDES, number, quantity};
 use crate::{Plane, PlanePosition, RunPlan, Stop};
 use grainwake_solver::dem::{Grain, MotionConstraint, outside};
 use grainwake_solver::flow::Boundary;
-use grainwake_solver::immersed::Start;
+use grainwake_solver::immersed::{Scheme, Start};
+use grainwake_solver::math::Precision;
 use grainwake_solver::sim::events::StopWhen;
 use grainwake_solver::sim::{Setup, StepRule};
 
@@ -38,6 +39,7 @@ pub(super) fn warnings(
     found.extend(contact::long_substeps(setup));
     found.extend(contact::few_substeps(setup));
     found.extend(contact::film_off_the_grid(setup));
+    found.extend(contact::tiny_asperities(setup));
     found.extend(contact::start_out_of_balance(setup));
     found.extend(light_grains(setup, plan.stop.as_ref()));
     found.extend(ignored_in_dry_runs(setup, plan, expect));
@@ -292,6 +294,8 @@ fn ignored_in_dry_runs(setup: &Setup, plan: &RunPlan, expect: &[Expectation]) ->
         (plan.fields > 0.0, "output.fields"),
         (expect.iter().any(of_flow), "expect.max_divergence"),
         (setup.start != Start::default(), "coupling.start"),
+        (setup.scheme != Scheme::default(), "coupling.scheme"),
+        (setup.precision != Precision::default(), "run.precision"),
     ];
     let requested = requests.into_iter().filter(|(requested, _)| *requested);
     let names: Vec<&str> = requested.map(|(_, name)| name).collect();
