@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds the wheel of the Python package, tests it in clean environments, checks its types and runs
-# the notebooks. Wheel and executed notebooks are kept for .ci/site.sh. Bounds: wheel at most 15 MB,
-# each notebook below 60 s.
-# The program is $GRAINWAKE, or built if that is empty.
+# Tests the wheel of the Python package in clean environments, checks its types and runs the
+# notebooks. The executed notebooks are kept for .ci/site.sh. Bound: each notebook below 60 s.
+# The wheel is $WHEEL, in target/site-input, or built by .ci/wheel.sh if that is empty. The program
+# is $GRAINWAKE, or built if that is empty.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 root="$PWD"
@@ -12,32 +12,17 @@ work="$(mktemp -d)"
 trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$work"' EXIT
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 
-if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
-  apt-get update -q && apt-get install -qy python3-venv
-fi
+wheel="${WHEEL:-$(bash .ci/wheel.sh)}"
+input="$(dirname "$wheel")"
 
-# 1. The wheel.
-python3 -m venv "$work/build"
-"$work/build/bin/pip" install -q 'maturin>=1.9,<2'
-PATH="$work/build/bin:$PATH" maturin build --release --quiet \
-  -m crates/python/Cargo.toml -o "$work/wheels"
-wheel="$(ls "$work"/wheels/grainwake-*.whl)"
-size="$(stat -c %s "$wheel")"
-echo "python: wheel of $((size / 1000)) kB after $((SECONDS - started)) s"
-input="${CARGO_TARGET_DIR:-$root/target}/site-input"
-rm -rf "$input"
-mkdir -p "$input"
-cp "$wheel" "$input/"
-test "$size" -le 15000000 || { echo "the wheel is larger than 15 MB" >&2; exit 1; }
-
-# 2. An environment without optional packages: the example of the manual.
+# 1. An environment without optional packages: the example of the manual.
 python3 -m venv "$work/plain"
 "$work/plain/bin/pip" install -q "$wheel"
 python3 .ci/first_example.py docs/python.md > "$work/first.py"
 (cd "$work" && "$work/plain/bin/python" first.py)
 (cd "$work" && "$work/plain/bin/python" "$root/.ci/imports.py")
 
-# 3. Tests with optional packages; beside them on another core the types and the statistics of the
+# 2. Tests with optional packages; beside them on another core the types and the statistics of the
 # studies by a second route. Then the notebooks, whose time is bounded.
 python3 -m venv "$work/full"
 "$work/full/bin/pip" install -q "$wheel[all]" pytest mypy pandas-stubs \

@@ -33,7 +33,8 @@ fn limits() -> ReadLimits {
 /// Data beside a detached header.
 const RAW: [u8; 60] = [7; 60];
 
-/// Passes the bytes to the reader of this extension: `slices` is the second of three in a folder.
+/// Passes the bytes to the reader of this extension: `slices` is the second of three in a folder,
+/// `pngs` the second of two.
 fn open(extension: &str, bytes: &[u8]) -> bool {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(format!("a.{extension}"));
@@ -44,6 +45,11 @@ fn open(extension: &str, bytes: &[u8]) -> bool {
                 std::fs::write(path.join(format!("a_{slice}.tif")), slice_file()).unwrap();
             }
             std::fs::write(path.join("a_2.tif"), bytes).unwrap();
+        }
+        "pngs" => {
+            std::fs::create_dir(&path).unwrap();
+            std::fs::write(path.join("a_1.png"), png_file()).unwrap();
+            std::fs::write(path.join("a_2.png"), bytes).unwrap();
         }
         "tiled" | "big" => {
             let path = folder.path().join("a.tif");
@@ -60,6 +66,15 @@ fn open(extension: &str, bytes: &[u8]) -> bool {
         "stl" | "obj" | "ply" | "anm" => read_mesh(&path, 1e-3, &limits()).is_ok(),
         _ => read_volume(&path, &limits()).is_ok(),
     }
+}
+
+/// One PNG slice of a folder.
+fn png_file() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 3, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[1, 2, 3, 4, 5, 6]).unwrap();
+    bytes
 }
 
 /// One slice of a folder.
@@ -132,6 +147,7 @@ fn sound() -> Vec<(&'static str, Vec<u8>)> {
         ("tiled", Layout { wide: false }.file()),
         ("big", Layout { wide: true }.file()),
         ("slices", slice_file()),
+        ("pngs", png_file()),
         ("npz", zipped("a.npy", &npy)),
         ("npy", npy),
         ("nhdr", apart.to_vec()),

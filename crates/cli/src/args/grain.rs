@@ -73,7 +73,7 @@ pub struct FromMeshArgs {
 /// Arguments of `grain from-scan`.
 #[derive(Debug, Args)]
 pub struct FromScanArgs {
-    /// Image: multi-page .tif, .npy, .npz, .nrrd, .mha, or a folder of .tif slices
+    /// Image: multi-page .tif, .npy, .npz, .nrrd, .mha, or a folder of .tif or .png slices
     pub image: PathBuf,
     /// Edge length of a voxel, for example "12 um"
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]

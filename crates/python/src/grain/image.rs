@@ -83,8 +83,8 @@ impl PyGrain {
     /// Parameters
     /// ----------
     /// image : path-like or array_like, shape (z, y, x)
-    ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
-    ///     booleans are labels with 0 for background, floating numbers are grey values.
+    ///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif or .png slices, or volume. Integers
+    ///     and booleans are labels with 0 for background, floating numbers are grey values.
     /// voxel : float or str
     ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, and so
     ///     does a grain with too few voxels free of blur to measure its grey value.
@@ -189,8 +189,8 @@ impl PyGrain {
 /// Parameters
 /// ----------
 /// image : path-like or array_like, shape (z, y, x)
-///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif slices, or volume. Integers and
-///     booleans are labels with 0 for background, floating numbers are grey values.
+///     File (.tif, .npy, .npz, .nrrd, .mha), folder of .tif or .png slices, or volume. Integers
+///     and booleans are labels with 0 for background, floating numbers are grey values.
 /// voxel : float or str
 ///     Edge length of a voxel [m]. A file that states another one gives a `CaseWarning`, as do
 ///     grains with too few voxels free of blur to measure their grey value.

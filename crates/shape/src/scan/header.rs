@@ -99,7 +99,7 @@ pub(super) fn voxels(
         Some(name) if is_several(name) => {
             return Err(unsupported(format!(
                 "its voxels lie in several files, {name:?}; join them to one file, or save them \
-                 as a folder of .tif slices"
+                 as a folder of .tif or .png slices"
             )));
         }
         Some(name) => {

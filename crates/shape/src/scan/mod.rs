@@ -15,6 +15,7 @@
 //! differ from the sphere by 3 % of volume, which cannot be recovered from the mask.
 
 mod assumed;
+mod bits;
 mod build;
 mod crop;
 mod cure;
@@ -32,6 +33,7 @@ mod npz;
 mod nrrd;
 mod options;
 mod phases;
+mod png;
 mod read;
 mod refusals;
 mod regions;

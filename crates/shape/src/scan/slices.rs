@@ -1,8 +1,8 @@
-//! A folder of slices: one TIFF per slice, ordered by the numbers in the file names.
+//! A folder of slices: one TIFF or PNG per slice, ordered by the numbers in the file names.
 
 use super::geometry::StatedVoxel;
-use super::tiff;
 use super::volume::{Volume, Voxels, count};
+use super::{png, tiff};
 use crate::error::{Result, ShapeError};
 use crate::limits::{ReadLimits, SourceFile, extension, read_bytes};
 use sha2::{Digest, Sha256};
@@ -12,15 +12,7 @@ use std::path::{Path, PathBuf};
 pub(super) type Slices = (Volume, SourceFile, Option<StatedVoxel>);
 
 pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<Slices> {
-    let io = |e| ShapeError::io(folder, e);
-    let mut files: Vec<PathBuf> = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let path = entry.map_err(io)?.path();
-        if matches!(extension(&path).as_str(), "tif" | "tiff") {
-            files.push(path);
-        }
-    }
-    files.sort_by_cached_key(|path| by_number(path));
+    let files = slice_files(folder)?;
     if let Some(reason) = gap(&files) {
         return Err(ShapeError::unsupported(folder, reason));
     }
@@ -31,7 +23,10 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<Slices> {
     for path in &files {
         let (bytes, source) = read_bytes(path, limits)?;
         digest.update(source.sha256.as_bytes());
-        let (slice, stated) = tiff::read(path, &bytes, limits)?;
+        let (slice, stated) = match extension(path).as_str() {
+            "png" => (png::read(path, &bytes, limits)?, None),
+            _ => tiff::read(path, &bytes, limits)?,
+        };
         voxel = voxel.or(stated);
         if slice.dims[2] != 1 || (dims[2] > 0 && slice.dims[..2] != dims[..2]) {
             let reason = format!(
@@ -47,12 +42,35 @@ pub(super) fn read(folder: &Path, limits: &ReadLimits) -> Result<Slices> {
         count(folder, all.map(|n| n as u64), limits)?;
         voxels.append(slice.voxels);
     }
-    if files.is_empty() {
-        let reason = "the folder holds no .tif slices";
-        return Err(ShapeError::unsupported(folder, reason));
-    }
     let volume = Volume::from_voxels(folder, dims, voxels)?;
     Ok((volume, SourceFile::new(folder, digest), voxel))
+}
+
+/// Returns the slices of a folder in their order: its TIFF files, or its PNG files if it has no
+/// TIFF.
+fn slice_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let io = |e| ShapeError::io(folder, e);
+    let mut all: Vec<PathBuf> = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        all.push(entry.map_err(io)?.path());
+    }
+    let of = |extensions: &[&str]| -> Vec<PathBuf> {
+        all.iter().filter(|path| extensions.contains(&&*extension(path))).cloned().collect()
+    };
+    let mut files = of(&["tif", "tiff"]);
+    if files.is_empty() {
+        files = of(&["png"]);
+    }
+    if files.is_empty() {
+        let mut reason = "the folder holds no .tif or .png slices".to_owned();
+        if let Some(other) = ["bmp", "jpg", "jpeg", "dcm"].iter().find(|e| !of(&[e]).is_empty()) {
+            let count = of(&[other]).len();
+            reason += &format!(", but {count} .{other}; convert them to 8- or 16-bit TIFF");
+        }
+        return Err(ShapeError::unsupported(folder, reason));
+    }
+    files.sort_by_cached_key(|path| by_number(path));
+    Ok(files)
 }
 
 /// Describes what keeps the files from being one series of slices: names that differ in more than
@@ -148,6 +166,28 @@ mod tests {
         write("slice_11.tif", 1, &[7]);
         let error = read(folder.path(), &limits).unwrap_err();
         assert!(error.to_string().contains("slice_11"), "{error}");
+    }
+
+    #[test]
+    fn png_slices_are_read_if_there_is_no_tiff() {
+        let folder = tempfile::tempdir().unwrap();
+        let limits = ReadLimits::default();
+        std::fs::write(folder.path().join("s1.bmp"), "").unwrap();
+        let error = read(folder.path(), &limits).unwrap_err().to_string();
+        assert!(error.contains("but 1 .bmp; convert them"), "{error}");
+        for (name, values) in [("s10.png", [3u8, 4]), ("s9.png", [1, 2])] {
+            let file = std::fs::File::create(folder.path().join(name)).unwrap();
+            let mut encoder = ::png::Encoder::new(file, 2, 1);
+            encoder.set_color(::png::ColorType::Grayscale);
+            encoder.write_header().unwrap().write_image_data(&values).unwrap();
+        }
+        let (volume, ..) = read(folder.path(), &limits).unwrap();
+        assert_eq!(volume, Volume::from_labels([2, 1, 2], vec![1, 2, 3, 4]).unwrap());
+        // A picture beside TIFF slices is no slice.
+        let mut file = std::fs::File::create(folder.path().join("s1.tif")).unwrap();
+        TiffEncoder::new(&mut file).unwrap().write_image::<Gray8>(1, 1, &[7]).unwrap();
+        let (volume, ..) = read(folder.path(), &limits).unwrap();
+        assert_eq!(volume, Volume::from_labels([1, 1, 1], vec![7]).unwrap());
     }
 
     fn names(names: &[&str]) -> Vec<PathBuf> {

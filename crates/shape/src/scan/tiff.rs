@@ -1,5 +1,6 @@
 //! Multi-page TIFF, greyscale, one page per slice along z.
 
+use super::bits::unpack;
 use super::description::Description;
 use super::geometry::StatedVoxel;
 use super::volume::{Volume, Voxels, count};
@@ -7,10 +8,10 @@ use crate::error::{Result, ShapeError};
 use crate::limits::ReadLimits;
 use std::io::Cursor;
 use std::path::Path;
-use tiff::ColorType;
 use tiff::decoder::ifd::Value;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
-use tiff::tags::Tag;
+use tiff::tags::{CompressionMethod, Tag};
+use tiff::{ColorType, TiffError, TiffUnsupportedError};
 
 /// Upper bound of the compression ratio of all TIFF codecs; pages that declare more are refused.
 const BEST_RATIO: u64 = 5000;
@@ -40,13 +41,17 @@ pub(super) fn read(
         let (width, height) = decoder.dimensions().map_err(|e| malformed(&e))?;
         let color = decoder.colortype().map_err(|e| malformed(&e))?;
         let bits = match color {
-            ColorType::Gray(bits @ (8 | 16 | 32 | 64)) => bits,
+            ColorType::Gray(bits @ (1 | 8 | 16 | 32 | 64)) => bits,
             other => {
                 let remedy = "convert it to greyscale of 8, 16 or 32 bits";
                 let reason = format!("page {pages} is {other:?}; {remedy}");
                 return Err(ShapeError::unsupported(path, reason));
             }
         };
+        if bits == 1 && lowest_bit_first(&mut decoder) {
+            let reason = "its bits have the lowest one first (FillOrder 2); save it with 8 bits";
+            return Err(ShapeError::unsupported(path, reason));
+        }
         let page = (width, height, color);
         if *first.get_or_insert(page) != page {
             return Err(malformed(&format!(
@@ -54,7 +59,7 @@ pub(super) fn read(
             )));
         }
         count(path, [width.into(), height.into(), pages + 1], limits)?;
-        let size = u64::from(width) * u64::from(height) * u64::from(bits).div_ceil(8);
+        let size = (u64::from(width) * u64::from(bits)).div_ceil(8) * u64::from(height);
         if size > BEST_RATIO.saturating_mul(bytes.len() as u64) {
             return Err(malformed(&format!(
                 "page {pages} claims {width} x {height} voxels, the file has only {} bytes",
@@ -62,8 +67,22 @@ pub(super) fn read(
             )));
         }
         decoder = decoder.with_limits(memory(size as usize));
-        let decoded = decoder.read_image().map_err(|e| malformed(&format!("page {pages}: {e}")))?;
-        let voxels = voxels(decoded);
+        let decoded = decoder.read_image().map_err(|e| match compression(&e) {
+            Some(method) => {
+                let reason = format!(
+                    "page {pages} has the compression {method}, which is not read; save it \
+                     uncompressed, or with LZW, Deflate or PackBits"
+                );
+                ShapeError::unsupported(path, reason)
+            }
+            None => malformed(&format!("page {pages}: {e}")),
+        })?;
+        let voxels = match decoded {
+            DecodingResult::U8(rows) if bits == 1 => {
+                Voxels::Labels(unpack(&rows, width as usize, 1).map(u32::from).collect())
+            }
+            other => voxels(other),
+        };
         if voxels.len() as u64 != u64::from(width) * u64::from(height) {
             return Err(malformed(&format!("page {pages} is incomplete")));
         }
@@ -85,6 +104,28 @@ pub(super) fn read(
     let (width, height, _) = first.unwrap_or((0, 0, ColorType::Gray(8)));
     let dims = [width as usize, height as usize, pages as usize];
     Ok((Volume::from_voxels(path, dims, all)?, stated))
+}
+
+/// Returns the name of the compression method if it is the reason of an error.
+fn compression(error: &TiffError) -> Option<String> {
+    let TiffError::UnsupportedError(TiffUnsupportedError::UnsupportedCompressionMethod(method)) =
+        error
+    else {
+        return None;
+    };
+    Some(match method {
+        CompressionMethod::ModernJPEG => "JPEG".to_owned(),
+        CompressionMethod::Unknown(34925) => "LZMA".to_owned(),
+        CompressionMethod::Unknown(34933) => "PNG".to_owned(),
+        CompressionMethod::Unknown(number) => format!("number {number}"),
+        other => format!("{other:?}"),
+    })
+}
+
+/// Returns whether the bits of a byte are stored from the lowest to the highest.
+fn lowest_bit_first(decoder: &mut Decoder<Cursor<&[u8]>>) -> bool {
+    let order = decoder.find_tag(Tag::FillOrder).ok().flatten();
+    order.is_some_and(|order| order.into_u32().is_ok_and(|n| n == 2))
 }
 
 /// Returns the description of the first page.
@@ -155,6 +196,54 @@ mod tests {
         assert_eq!(open(&write::<Gray32Float>(&whole, 3, 1)).unwrap(), expect);
         let grey = open(&write::<Gray32Float>(&[&[0.5, 1.0]], 2, 1)).unwrap();
         assert_eq!(grey.voxels, Voxels::Grey(vec![0.5, 1.0]));
+    }
+
+    /// A file of one strip with the given tags beside those of the layout.
+    fn raw(width: u32, height: u32, tags: &[(u16, u32)], data: &[u8]) -> Vec<u8> {
+        let mut entries = vec![
+            (256, width),
+            (257, height),
+            (258, 1),
+            (262, 1),
+            (278, height),
+            (279, data.len() as u32),
+        ];
+        entries.extend(tags);
+        let start = 8 + 2 + 12 * (entries.len() as u32 + 1) + 4;
+        entries.push((273, start));
+        entries.sort();
+        let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+        bytes.extend((entries.len() as u16).to_le_bytes());
+        for (tag, value) in entries {
+            bytes.extend(tag.to_le_bytes());
+            bytes.extend(4u16.to_le_bytes());
+            bytes.extend(1u32.to_le_bytes());
+            bytes.extend(value.to_le_bytes());
+        }
+        bytes.extend(0u32.to_le_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    #[test]
+    fn a_mask_of_single_bits_is_read() {
+        // Ten columns take two bytes; the six last bits of a row are padding.
+        let rows = [0b1010_0001, 0b0111_1111, 0b0000_0000, 0b1000_0000];
+        let expect: Vec<u32> = vec![1, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0];
+        let mask = open(&raw(10, 2, &[(259, 1)], &rows)).unwrap();
+        assert_eq!(mask, Volume::from_labels([10, 2, 1], expect).unwrap());
+        let error = open(&raw(10, 2, &[(259, 1), (266, 2)], &rows)).unwrap_err();
+        assert!(error.to_string().contains("FillOrder 2"), "{error}");
+    }
+
+    #[test]
+    fn a_compression_that_is_not_read_is_named() {
+        for (number, name) in [(7, "JPEG"), (50000, "ZSTD"), (34925, "LZMA"), (4, "Fax4")] {
+            let error = open(&raw(8, 1, &[(259, number)], &[0; 64])).unwrap_err();
+            let message = error.to_string();
+            assert!(matches!(error, ShapeError::Unsupported { .. }), "{message}");
+            assert!(message.contains(&format!("compression {name},")), "{message}");
+        }
     }
 
     #[test]
