@@ -77,7 +77,8 @@ pub(super) fn read(
             }
             None => malformed(&format!("page {pages}: {e}")),
         })?;
-        let voxels = match decoded {
+        let stored = if white_is_zero(&mut decoder) { inverted(decoded) } else { decoded };
+        let voxels = match stored {
             DecodingResult::U8(rows) if bits == 1 => {
                 Voxels::Labels(unpack(&rows, width as usize, 1).map(u32::from).collect())
             }
@@ -122,10 +123,34 @@ fn compression(error: &TiffError) -> Option<String> {
     })
 }
 
+/// Returns whether the page says that white is zero, in which case the decoder inverts its values.
+fn white_is_zero(decoder: &mut Decoder<Cursor<&[u8]>>) -> bool {
+    number(decoder, Tag::PhotometricInterpretation) == Some(0)
+}
+
+/// Returns the values as they are stored. Programs write masks and labels with white as zero
+/// (ImageJ with an inverting lookup table, tifffile for booleans), where the value of the grains is
+/// still the larger one.
+fn inverted(page: DecodingResult) -> DecodingResult {
+    use DecodingResult as Page;
+    match page {
+        Page::U8(v) => Page::U8(v.into_iter().map(|v| !v).collect()),
+        Page::U16(v) => Page::U16(v.into_iter().map(|v| !v).collect()),
+        Page::U32(v) => Page::U32(v.into_iter().map(|v| !v).collect()),
+        Page::U64(v) => Page::U64(v.into_iter().map(|v| !v).collect()),
+        Page::F32(v) => Page::F32(v.into_iter().map(|v| 1.0 - v).collect()),
+        Page::F64(v) => Page::F64(v.into_iter().map(|v| 1.0 - v).collect()),
+        other => other,
+    }
+}
+
+fn number(decoder: &mut Decoder<Cursor<&[u8]>>, tag: Tag) -> Option<u32> {
+    decoder.find_tag(tag).ok().flatten()?.into_u32().ok()
+}
+
 /// Returns whether the bits of a byte are stored from the lowest to the highest.
 fn lowest_bit_first(decoder: &mut Decoder<Cursor<&[u8]>>) -> bool {
-    let order = decoder.find_tag(Tag::FillOrder).ok().flatten();
-    order.is_some_and(|order| order.into_u32().is_ok_and(|n| n == 2))
+    number(decoder, Tag::FillOrder) == Some(2)
 }
 
 /// Returns the description of the first page.
@@ -200,15 +225,9 @@ mod tests {
 
     /// A file of one strip with the given tags beside those of the layout.
     fn raw(width: u32, height: u32, tags: &[(u16, u32)], data: &[u8]) -> Vec<u8> {
-        let mut entries = vec![
-            (256, width),
-            (257, height),
-            (258, 1),
-            (262, 1),
-            (278, height),
-            (279, data.len() as u32),
-        ];
-        entries.extend(tags);
+        let mut entries = tags.to_vec();
+        let size = data.len() as u32;
+        entries.extend([(256, width), (257, height), (278, height), (279, size)]);
         let start = 8 + 2 + 12 * (entries.len() as u32 + 1) + 4;
         entries.push((273, start));
         entries.sort();
@@ -230,16 +249,37 @@ mod tests {
         // Ten columns take two bytes; the six last bits of a row are padding.
         let rows = [0b1010_0001, 0b0111_1111, 0b0000_0000, 0b1000_0000];
         let expect: Vec<u32> = vec![1, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0];
-        let mask = open(&raw(10, 2, &[(259, 1)], &rows)).unwrap();
+        let mask = open(&raw(10, 2, &[(258, 1), (259, 1), (262, 1)], &rows)).unwrap();
         assert_eq!(mask, Volume::from_labels([10, 2, 1], expect).unwrap());
-        let error = open(&raw(10, 2, &[(259, 1), (266, 2)], &rows)).unwrap_err();
+        let tags = [(258, 1), (259, 1), (262, 1), (266, 2)];
+        let error = open(&raw(10, 2, &tags, &rows)).unwrap_err();
         assert!(error.to_string().contains("FillOrder 2"), "{error}");
+    }
+
+    #[test]
+    fn values_are_the_stored_ones_where_white_is_zero() {
+        let labels =
+            |values: &[u32]| Volume::from_labels([values.len(), 1, 1], values.to_vec()).unwrap();
+        let page = |bits, width, data: &[u8]| {
+            open(&raw(width, 1, &[(258, bits), (259, 1), (262, 0)], data)).unwrap()
+        };
+        assert_eq!(page(1, 3, &[0b1010_0000]), labels(&[1, 0, 1]));
+        assert_eq!(page(8, 3, &[0, 255, 7]), labels(&[0, 255, 7]));
+        assert_eq!(page(16, 2, &[1, 0, 0, 2]), labels(&[1, 512]));
+        assert_eq!(page(32, 1, &[7, 0, 0, 0]), labels(&[7]));
+        let mut tags = vec![(258, 32), (259, 1), (262, 0), (339, 3)];
+        let floats: Vec<u8> = [0.25f32, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let grey = open(&raw(2, 1, &tags, &floats)).unwrap();
+        assert_eq!(grey.voxels, Voxels::Grey(vec![0.25, 0.0]));
+        tags[2].1 = 1;
+        assert_eq!(open(&raw(2, 1, &tags, &floats)).unwrap(), grey);
     }
 
     #[test]
     fn a_compression_that_is_not_read_is_named() {
         for (number, name) in [(7, "JPEG"), (50000, "ZSTD"), (34925, "LZMA"), (4, "Fax4")] {
-            let error = open(&raw(8, 1, &[(259, number)], &[0; 64])).unwrap_err();
+            let tags = [(258, 1), (259, number), (262, 1)];
+            let error = open(&raw(8, 1, &tags, &[0; 64])).unwrap_err();
             let message = error.to_string();
             assert!(matches!(error, ShapeError::Unsupported { .. }), "{message}");
             assert!(message.contains(&format!("compression {name},")), "{message}");
