@@ -127,7 +127,8 @@ impl TriangleMesh {
         }
         sizes.sort_unstable_by(|a, b| b.cmp(a));
         Err(ShapeError::bad_mesh(format!(
-            "the mesh consists of {} separate surfaces of {} faces; export one grain at a time",
+            "the mesh consists of {} separate surfaces of {} faces; export one grain at a time, \
+             without the surfaces of its cavities (in MeshLab: Remove Isolated Pieces)",
             sizes.len(),
             first_few(&sizes, 5)
         )))
